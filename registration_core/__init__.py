@@ -1,0 +1,22 @@
+"""Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
+
+from registration_core.camera import Intrinsics
+from registration_core.estimate import Estimate, Hypothesis, SnapStep
+from registration_core.object_model import ObjectModel, Symmetries
+from registration_core.problem import region_of_interest
+from registration_core.snap import snap, snap_steps, warm_up
+from registration_core.snap_config import SnapConfig
+
+__all__ = [
+    "Estimate",
+    "Hypothesis",
+    "Intrinsics",
+    "ObjectModel",
+    "SnapConfig",
+    "SnapStep",
+    "Symmetries",
+    "region_of_interest",
+    "snap",
+    "snap_steps",
+    "warm_up",
+]

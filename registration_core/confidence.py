@@ -1,0 +1,48 @@
+"""How likely the result is right: the mass of the winning mode and the share of it that was measured."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from registration_core.kernels import Array32
+from registration_core.modes import distances
+from registration_core.selection import Residual
+from registration_core.snap_config import ConfidenceConfig
+from registration_core.viewpoint_model import ViewpointModel
+
+Array = NDArray[np.float64]
+
+
+def modes_of(poses: Array32, model: ViewpointModel, radius: float) -> NDArray[np.intp]:
+    """For each of the poses (N, 3, 4), best first, the index of the best pose whose mode it belongs to.
+
+    Args:
+        radius: poses whose MSSD is below this share of the diameter are one mode; symmetric twins are.
+    """
+    apart = np.empty((len(poses), len(poses)), np.float32)
+    distances(poses, model.extremes, model.symmetries, apart)
+    close = apart < radius * model.diameter
+    mode = np.full(len(poses), -1, dtype=np.intp)
+    for i in range(len(poses)):
+        if mode[i] < 0:
+            mode[close[i] & (mode < 0)] = i
+    return mode
+
+
+def mode_masses(scores: Array, modes: NDArray[np.intp]) -> Array:
+    """Softmax (M,) over the best score of each mode, in the order of `np.unique(modes)`; scores are
+    log-odds.
+    """
+    best = np.array([scores[modes == mode].max() for mode in np.unique(modes)])
+    mass = np.exp(best - best.max())
+    return mass / mass.sum()
+
+
+def confidence(mass: float, shares: Array, config: ConfidenceConfig) -> float:
+    """Probability in [0, 1] that the MSSD is below 5 % of the diameter, for residual shares (12,) of the
+    winner.
+    """
+    matched = shares[Residual.MATCH] + 0.5 * shares[Residual.PLANE_MATCH]
+    claimed = shares[: Residual.UNMEASURED].sum() - shares[Residual.HIDDEN]
+    match = matched / max(claimed, 0.05)
+    logit = config.intercept + config.mass * mass + config.match * match
+    return float(1.0 / (1.0 + np.exp(-logit)))

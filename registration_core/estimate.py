@@ -1,0 +1,58 @@
+"""What a snap returns."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One of the places where the object may be."""
+
+    T_camera_object: Array
+    """(4, 4)."""
+    weight: float
+    """Share of the belief, in [0, 1]; all hypotheses of an estimate sum to 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """A refined pose and what is known about it."""
+
+    T_camera_object: Array
+    """(4, 4)."""
+    confidence: float
+    """In [0, 1]: probability that the MSSD is below 5 % of the diameter."""
+    covariance: Array
+    """(6, 6), order (translation in camera axes [m], rotation vector in camera axes [rad])."""
+    hypotheses: tuple[Hypothesis, ...]
+    """The distinct modes, best first; symmetric twins are one."""
+    seconds: float
+    """Wall-clock time it took."""
+    evaluations: int
+    """Hypotheses compared with the image."""
+    converged: bool
+    """Whether the search settled: False where there was too little evidence to go on."""
+    seed: int
+    """`snap(..., rng=np.random.default_rng(seed))` with the same inputs gives this estimate again."""
+
+
+@dataclass(frozen=True, eq=False)
+class SnapStep:
+    """The state of a snap after one iteration."""
+
+    iteration: int
+    """From 1 on."""
+    iterations: int
+    """How many there will be."""
+    T_camera_object: Array
+    """(4, 4), the best pose so far."""
+    confidence: float
+    """Of that pose, in [0, 1]."""
+    particles: Array
+    """(N, 4, 4), the hypotheses alive, best first where they are ranked."""
+    estimate: Estimate | None = None
+    """The result, in the last step only."""

@@ -1,0 +1,270 @@
+# mypy: allow-untyped-defs
+"""The depth image around the start, made ready: cropped, reduced, with normals and the supporting plane."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from registration_core.camera import Intrinsics
+from registration_core.kernels import FAST, Array32, f4, random_state, uniform
+from registration_core.snap_config import ObservationConfig
+from registration_core.viewpoint_model import ViewpointModel
+
+ALIGNMENT = 8
+"""Crops start at multiples of this, pixels, so that every reduction falls on the same blocks of pixels."""
+
+NEAREST = 0.15
+"""Metres; the window is computed as if nothing could come nearer to the camera than this."""
+
+
+class Grid(NamedTuple):
+    """A reduced depth image as kernels take it; the outermost pixels are always 0, "not measured"."""
+
+    depth: Array32
+    """(H, W), metres."""
+    normals: Array32
+    """(3, H, W), towards the camera; 0 where unknown."""
+    weight: Array32
+    """(H, W), how much a pixel counts."""
+    fx: np.float32
+    fy: np.float32
+    cx: np.float32
+    cy: np.float32
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What a snap sees."""
+
+    grid: Grid
+    block: int
+    """Pixels of the depth image along a side of a pixel of the grid."""
+    measured: int
+    """Pixels of the grid with depth within reach of the object."""
+
+
+def window(
+    camera: Intrinsics, centre: NDArray[np.float64], radius: float, reach: float
+) -> tuple[int, int, int, int]:
+    """(left, top, right, bottom) of the pixels that a snap may look at, aligned, within the image.
+
+    Args:
+        centre: (3,), of the object at the start, camera axes, metres.
+        radius: of the object, metres.
+        reach: how far beyond it a snap looks, metres.
+    """
+    r = radius + reach
+    z = max(centre[2] - reach, NEAREST)
+    left = camera.fx * (centre[0] - r) / z + camera.cx
+    right = camera.fx * (centre[0] + r) / z + camera.cx
+    top = camera.fy * (centre[1] - r) / z + camera.cy
+    bottom = camera.fy * (centre[1] + r) / z + camera.cy
+    return (
+        _aligned(left, camera.width, np.floor),
+        _aligned(top, camera.height, np.floor),
+        _aligned(right, camera.width, np.ceil),
+        _aligned(bottom, camera.height, np.ceil),
+    )
+
+
+def _aligned(value: float, size: int, rounding: np.ufunc) -> int:
+    return int(min(max(rounding(value / ALIGNMENT) * ALIGNMENT, 0), size))
+
+
+def reduction(camera: Intrinsics, diameter: float, distance: float, pixels_across: int, most: int) -> int:
+    """The largest of 1, 2, 4 ... `most` by which the image can be reduced with the object still resolved."""
+    across = diameter * min(camera.fx, camera.fy) / max(distance, NEAREST)
+    block = 1
+    while block < most and across >= 2 * block * pixels_across:
+        block *= 2
+    return block
+
+
+def observe(
+    depth: NDArray[np.float32],
+    camera: Intrinsics,
+    centre: NDArray[np.float64],
+    model: ViewpointModel,
+    config: ObservationConfig,
+    rng: np.random.Generator,
+) -> Observation:
+    """Read the depth image (H, W), metres, around an object expected at `centre` (3,), camera axes."""
+    radius = model.radius
+    left, top, right, bottom = window(camera, centre, radius, config.reach)
+    block = reduction(camera, model.diameter, float(centre[2]), config.pixels_across, 4)
+    rows, columns = max(bottom - top, 0) // block, max(right - left, 0) // block
+    reduced = np.zeros((rows + 2, columns + 2), np.float32)
+    _reduce(depth[top:bottom, left:right], block, f4(config.depth_gap), reduced)
+    # a block's centre lies (block - 1) / 2 pixels beyond its first pixel; the border shifts the grid by one
+    fx, fy = f4(camera.fx / block), f4(camera.fy / block)
+    cx = f4((camera.cx - left - (block - 1) / 2) / block + 1)
+    cy = f4((camera.cy - top - (block - 1) / 2) / block + 1)
+    normals = np.zeros((3, *reduced.shape), np.float32)
+    _fit_normals(reduced, fx, fy, cx, cy, config.normal_radius, f4(config.depth_gap), normals)
+    weight = np.ones_like(reduced)
+    grid = Grid(reduced, normals, weight, fx, fy, cx, cy)
+    plane = _find_plane(grid, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
+    silhouette = model.mean_area * float(fx) * float(fy) / max(float(centre[2]), NEAREST) ** 2
+    least = max(config.plane_share, config.plane_excess * silhouette / max(int(np.count_nonzero(reduced)), 1))
+    if plane[4] > least:
+        _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
+    near = np.abs(reduced - centre[2]) < radius + config.reach
+    return Observation(grid, block, int(np.count_nonzero(near & (reduced > 0))))
+
+
+@njit(**FAST)
+def _reduce(depth, block, gap, out):
+    """Mean of each block over the pixels within `gap` of its nearest one; `out` has a border of 1."""
+    for i in range(out.shape[0] - 2):
+        for j in range(out.shape[1] - 2):
+            nearest = f4(1e9)
+            for a in range(block):
+                for b in range(block):
+                    z = depth[i * block + a, j * block + b]
+                    if z > 0:
+                        nearest = min(nearest, z)
+            total, count = f4(0), f4(0)
+            for a in range(block):
+                for b in range(block):
+                    z = depth[i * block + a, j * block + b]
+                    if z > 0 and z - nearest < gap:
+                        total += z
+                        count += f4(1)
+            out[i + 1, j + 1] = total / count if count > 0 else f4(0)
+
+
+@njit(**FAST)
+def _fit_normals(depth, fx, fy, cx, cy, radius, gap, out):
+    """Normals towards the camera by least squares of z = a + b du + c dv over neighbours within `gap`."""
+    height, width = depth.shape
+    for i in range(radius, height - radius):
+        for j in range(radius, width - radius):
+            z = depth[i, j]
+            if z <= f4(0):
+                continue
+            n = su = sv = suu = svv = suv = sz = suz = svz = f4(0)
+            for a in range(-radius, radius + 1):
+                for b in range(-radius, radius + 1):
+                    d = depth[i + a, j + b] - z
+                    m = f4(1) if abs(d) < gap else f4(0)
+                    u, v, d = f4(b) * m, f4(a) * m, d * m
+                    n += m
+                    su += u
+                    sv += v
+                    suu += u * u
+                    svv += v * v
+                    suv += u * v
+                    sz += d
+                    suz += u * d
+                    svz += v * d
+            if n < f4(6):
+                continue
+            suu -= su * su / n
+            svv -= sv * sv / n
+            suv -= su * sv / n
+            suz -= su * sz / n
+            svz -= sv * sz / n
+            determinant = suu * svv - suv * suv
+            if determinant < f4(1e-3) * n:
+                continue
+            zu = (suz * svv - svz * suv) / determinant
+            zv = (svz * suu - suz * suv) / determinant
+            x, y = (f4(j) - cx) / fx, (f4(i) - cy) / fy
+            ax, ay = z / fx + x * zu, y * zu
+            bx, by = x * zv, z / fy + y * zv
+            nx, ny, nz = ay * zv - zu * by, zu * bx - ax * zv, ax * by - ay * bx
+            scale = f4(1) / np.sqrt(nx * nx + ny * ny + nz * nz + f4(1e-20))
+            if nx * x + ny * y + nz > f4(0):
+                scale = -scale
+            out[0, i, j], out[1, i, j], out[2, i, j] = nx * scale, ny * scale, nz * scale
+
+
+@njit(**FAST)
+def _find_plane(grid, trials, tolerance, state):
+    """(5,): normal, offset and share of the pixels of the largest plane; the share is 0 where there is none.
+
+    Hypotheses come from one pixel and its normal, or from three pixels in turn.
+    """
+    height, width = grid.depth.shape
+    step = max(1, int(np.sqrt(height * width / 1500.0)))
+    p = np.empty((3, 4000), np.float32)
+    n = np.empty((3, 4000), np.float32)
+    count = 0
+    for i in range(1, height - 1, step):
+        for j in range(1, width - 1, step):
+            z = grid.depth[i, j]
+            if z > 0 and count < 4000:
+                p[0, count], p[1, count], p[2, count] = (
+                    (j - grid.cx) / grid.fx * z,
+                    (i - grid.cy) / grid.fy * z,
+                    z,
+                )
+                n[:, count] = grid.normals[:, i, j]
+                count += 1
+    plane = np.zeros(5, np.float32)
+    if count < 50:
+        return plane
+    for trial in range(trials):
+        a, b, c = int(uniform(state) * count), int(uniform(state) * count), int(uniform(state) * count)
+        normal = n[:, a].copy()
+        if trial % 2 == 0:
+            normal = np.cross(p[:, b] - p[:, a], p[:, c] - p[:, a])
+        length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
+        if length < f4(1e-4):
+            continue
+        normal /= length
+        offset = -(normal[0] * p[0, a] + normal[1] * p[1, a] + normal[2] * p[2, a])
+        support = 0
+        for k in range(count):
+            d = normal[0] * p[0, k] + normal[1] * p[1, k] + normal[2] * p[2, k] + offset
+            support += 1 if abs(d) < tolerance else 0
+        share = f4(support) / f4(count)
+        if share > plane[4]:
+            plane[:3], plane[3], plane[4] = normal, offset, share
+    if plane[4] > 0:
+        for _ in range(2):
+            _refit_plane(p, count, tolerance, plane)
+    return plane
+
+
+@njit(**FAST)
+def _refit_plane(p, count, tolerance, plane):
+    """Least squares over the plane's own points: the smallest principal axis of their scatter."""
+    mean = np.zeros(3)
+    scatter = np.zeros((3, 3))
+    inliers = 0
+    for sweep in range(2):
+        for k in range(count):
+            d = plane[0] * p[0, k] + plane[1] * p[1, k] + plane[2] * p[2, k] + plane[3]
+            if abs(d) >= tolerance:
+                continue
+            if sweep == 0:
+                inliers += 1
+                for i in range(3):
+                    mean[i] += p[i, k]
+            else:
+                for i in range(3):
+                    for j in range(3):
+                        scatter[i, j] += (p[i, k] - mean[i]) * (p[j, k] - mean[j])
+        if sweep == 0:
+            mean /= max(inliers, 1)
+    normal = np.linalg.eigh(scatter)[1][:, 0]
+    for i in range(3):
+        plane[i] = normal[i]
+    plane[3] = -(normal[0] * mean[0] + normal[1] * mean[1] + normal[2] * mean[2])
+
+
+@njit(**FAST)
+def _weigh_plane(grid, plane, tolerance, plane_weight, weight):
+    for i in range(weight.shape[0]):
+        for j in range(weight.shape[1]):
+            z = grid.depth[i, j]
+            x, y = (j - grid.cx) / grid.fx * z, (i - grid.cy) / grid.fy * z
+            d = plane[0] * x + plane[1] * y + plane[2] * z + plane[3]
+            nx, ny, nz = grid.normals[0, i, j], grid.normals[1, i, j], grid.normals[2, i, j]
+            along = abs(plane[0] * nx + plane[1] * ny + plane[2] * nz)
+            if abs(d) < tolerance and (along > f4(0.8) or along == f4(0)):
+                weight[i, j] = plane_weight

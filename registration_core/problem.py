@@ -1,0 +1,140 @@
+"""The inputs of a snap: checked, and brought into the form that the search works on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from registration_core import pose
+from registration_core.agreement import Prior
+from registration_core.camera import Intrinsics
+from registration_core.kernels import Array32, centred, f4, from_rows, to_rows, uncentred
+from registration_core.object_model import ObjectModel
+from registration_core.observation import window
+from registration_core.snap_config import SnapConfig, SpreadConfig
+from registration_core.viewpoint_model import ViewpointModel, viewpoint_model
+
+Array = NDArray[np.float64]
+
+FARTHEST = 30.0
+"""Metres; a median depth beyond this is taken for millimetres."""
+
+LEAST_SPREAD = (0.003, np.radians(3.0))
+"""Metres and radians: no start is trusted more than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One registration to be done; `T_camera_centre` poses turn about the centre of the object's bounding
+    box.
+    """
+
+    model: ViewpointModel
+    depth: NDArray[np.float32]
+    """(H, W), metres, 0 = no measurement."""
+    camera: Intrinsics
+    T_camera_object: Array
+    """(4, 4), the operator's pose."""
+    start: Array
+    """(4, 4), the same as `T_camera_centre`."""
+    prior: Prior
+    config: SnapConfig
+
+    def uncentred(self, T_camera_centre: Array) -> Array:
+        """`T_camera_object` of a pose (4, 4), exactly rigid."""
+        return uncentred(pose.orthonormalised(T_camera_centre), self.model.centre)
+
+    def uncentred_particles(self, rows: Array32) -> Array:
+        """`T_camera_object` (N, 4, 4) of poses (N, 3, 4), rigid up to the rounding of float32."""
+        return uncentred(from_rows(rows), self.model.centre)
+
+
+def checked_problem(
+    model: ObjectModel,
+    depth: ArrayLike,
+    camera: Intrinsics,
+    T_camera_object: ArrayLike,
+    config: SnapConfig,
+    start_spread: tuple[float, float] | None,
+) -> Problem:
+    """The inputs of `snap` as a Problem.
+
+    Raises:
+        ValueError: naming the argument that is wrong, and how.
+    """
+    T = pose.checked(T_camera_object, "T_camera_object")
+    image = checked_depth(depth, camera)
+    viewpoints = viewpoint_model(model)
+    start = centred(T, viewpoints.centre)
+    check_in_view(viewpoints, camera, start)
+    prior = _prior(start, config.spread, start_spread)
+    return Problem(viewpoints, image, camera, T, start, prior, config)
+
+
+def region_of_interest(
+    model: ObjectModel, camera: Intrinsics, T_camera_object: ArrayLike, config: SnapConfig
+) -> tuple[int, int, int, int]:
+    """(left, top, width, height) of the pixels that a snap from this pose may look at.
+
+    A snap on that part of the image, with `camera.cropped(...)`, gives the same estimate as one on the
+    whole image.
+
+    Raises:
+        ValueError: where the pose is none, or the object lies wholly outside the image.
+    """
+    T = pose.checked(T_camera_object, "T_camera_object")
+    centre = pose.apply(T, model.centre)
+    left, top, right, bottom = window(camera, centre, model.radius, config.observation.reach)
+    if left >= right or top >= bottom or centre[2] <= -model.radius:
+        raise ValueError("T_camera_object puts the object wholly outside the image")
+    return left, top, right - left, bottom - top
+
+
+def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
+    """The depth image (H, W) as float32 metres; what is not finite or not positive counts as not measured.
+
+    Raises:
+        ValueError: where its shape is not the camera's, it holds no depth, or it seems to be in millimetres.
+    """
+    try:
+        image = np.asarray(depth, dtype=np.float32)
+    except (TypeError, ValueError):
+        raise ValueError("depth must be an image of numbers") from None
+    if image.shape != (camera.height, camera.width):
+        raise ValueError(
+            f"depth must have the shape (height, width) of the camera, {(camera.height, camera.width)};"
+            f" it has {image.shape}"
+        )
+    measured = np.isfinite(image) & (image > 0)
+    if not measured.any():
+        raise ValueError("depth must hold measurements; all of its pixels are 0")
+    median = float(np.median(image[measured][:: max(1, int(measured.sum()) // 10_000)]))
+    if median > FARTHEST:
+        raise ValueError(f"depth must be in metres; its median is {median:.6g}, which looks like millimetres")
+    return image if measured.all() else np.where(measured, image, np.float32(0))
+
+
+def check_in_view(model: ViewpointModel, camera: Intrinsics, start: Array) -> None:
+    """Raise a ValueError where no part of the object at `T_camera_centre` (4, 4) can be in the image."""
+    points = pose.apply(start, model.coarse_vertices)
+    points = points[points[:, 2] > 0.0]
+    if len(points):
+        columns = camera.fx * points[:, 0] / points[:, 2] + camera.cx
+        rows = camera.fy * points[:, 1] / points[:, 2] + camera.cy
+        inside_columns = columns.max() > -0.5 and columns.min() < camera.width - 0.5
+        inside_rows = rows.max() > -0.5 and rows.min() < camera.height - 0.5
+        if inside_columns and inside_rows:
+            return
+    raise ValueError("T_camera_object puts the object wholly outside the image")
+
+
+def _prior(start: Array, config: SpreadConfig, start_spread: tuple[float, float] | None) -> Prior:
+    translation, rotation = config.translation, config.rotation
+    if start_spread is not None:
+        values = np.asarray(start_spread, dtype=np.float64)
+        if values.shape != (2,) or not np.isfinite(values).all() or (values < 0).any():
+            raise ValueError(
+                f"start_spread must be (metres, radians), neither negative; it is {start_spread!r}"
+            )
+        translation, rotation = np.maximum(values, LEAST_SPREAD)
+    return Prior(to_rows(start)[0], f4(translation), f4(rotation))

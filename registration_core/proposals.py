@@ -1,0 +1,114 @@
+# mypy: allow-untyped-defs
+"""Where a snap looks first: Gaussian draws about the start, most of them put onto the observed surface."""
+
+import numpy as np
+from numba import njit
+
+from registration_core.agreement import Prior, Surface
+from registration_core.kernels import FAST, Array32, f4, normal, random_state, turn, uniform, view_of
+from registration_core.observation import Grid
+from registration_core.snap_config import ProposalConfig
+
+
+def propose(
+    prior: Prior,
+    search: float,
+    surface: Surface,
+    grid: Grid,
+    config: ProposalConfig,
+    rng: np.random.Generator,
+) -> Array32:
+    """Poses (N, 3, 4), the start first, spread `search` times as wide as the prior."""
+    poses = np.empty((config.count, 3, 4), np.float32)
+    _propose(
+        prior.start, f4(prior.translation * search), f4(prior.rotation * search), np.array(config.scales,
+        np.float32), f4(config.gaussian_share), f4(config.ray_share), f4(config.max_shift),
+        f4(config.max_turn), config.tries, surface, grid, random_state(rng), poses,
+    )  # fmt: skip
+    return poses
+
+
+@njit(**FAST)
+def _propose(  # noqa: PLR0915 - one loop, for speed
+    start,
+    translation,
+    rotation,
+    scales,
+    gaussian_share,
+    ray_share,
+    max_shift,
+    max_turn,
+    tries,
+    surface,
+    grid,
+    state,
+    out,
+):
+    """Fill `out` (N, 3, 4).
+
+    A draw is *anchored* so: a random visible point of the model is put on the observed pixel under it,
+    along the viewing ray; then its normal is turned onto the observed normal, about that point. Pixels on
+    the plane are avoided.
+    """
+    height, width = grid.depth.shape
+    fx, fy, cx, cy = grid.fx, grid.fy, grid.cx, grid.cy
+    turned = np.empty((3, 4), np.float32)
+    out[0] = start
+    for i in range(1, out.shape[0]):
+        T = out[i]
+        scale = scales[i % scales.shape[0]]
+        r, s = rotation * scale, translation * scale
+        turn(start, r * normal(state), r * normal(state), r * normal(state), T)
+        kind = uniform(state)
+        anchored = False
+        view = k = row = column = 0
+        x = y = z = seen = f4(0)
+        for _ in range(tries):
+            T[0, 3] = start[0, 3] + s * normal(state)
+            T[1, 3] = start[1, 3] + s * normal(state)
+            T[2, 3] = start[2, 3] + s * normal(state)
+            if kind < gaussian_share:
+                break
+            view_now = view_of(T, surface.view_of_cell)
+            k_now = int(uniform(state) * surface.points.shape[2])
+            px, py, pz = turned_vector(T, surface.points[view_now, :, k_now])
+            depth = pz + T[2, 3]
+            if depth < f4(0.05):
+                continue
+            column_now = int(np.floor((px + T[0, 3]) / depth * fx + cx + f4(0.5)))
+            row_now = int(np.floor((py + T[1, 3]) / depth * fy + cy + f4(0.5)))
+            if column_now < 0 or row_now < 0 or column_now >= width or row_now >= height:
+                continue
+            seen_now = grid.depth[row_now, column_now]
+            if seen_now <= f4(0) or abs(seen_now - depth) > max_shift:
+                continue
+            anchored = True
+            view, k, row, column, x, y, z, seen = view_now, k_now, row_now, column_now, px, py, pz, seen_now
+            if grid.weight[row, column] > f4(0.5):
+                break
+        if not anchored:
+            continue
+        ox, oy, oz = grid.normals[0, row, column], grid.normals[1, row, column], grid.normals[2, row, column]
+        if kind > gaussian_share + ray_share and ox * ox + oy * oy + oz * oz > f4(0):
+            a, b, c = turned_vector(T, surface.normals[view, :, k])
+            ax, ay, az = b * oz - c * oy, c * ox - a * oz, a * oy - b * ox
+            sine = np.sqrt(ax * ax + ay * ay + az * az)
+            angle = np.arctan2(sine, a * ox + b * oy + c * oz)
+            if sine > f4(1e-5) and angle < max_turn:
+                share = angle / sine
+                turn(T, ax * share, ay * share, az * share, turned)
+                T[:] = turned
+                x, y, z = turned_vector(T, surface.points[view, :, k])
+        T[0, 3] = (f4(column) - cx) / fx * seen - x
+        T[1, 3] = (f4(row) - cy) / fy * seen - y
+        T[2, 3] = seen - z
+
+
+@njit(**FAST, inline="always")
+def turned_vector(T, v):
+    """R v of a pose (3, 4)."""
+    return (
+        T[0, 0] * v[0] + T[0, 1] * v[1] + T[0, 2] * v[2],
+        T[1, 0] * v[0] + T[1, 1] * v[1] + T[1, 2] * v[2],
+        T[2, 0] * v[0] + T[2, 1] * v[1] + T[2, 2] * v[2],
+    )

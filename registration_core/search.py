@@ -1,0 +1,98 @@
+"""One snap under way: what it works on, and the moves of the fast method."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from registration_core.agreement import Surface, agreement_weights, sparse_agreement
+from registration_core.kernels import Array32, f4
+from registration_core.modes import distinct, move_to_nearest_twin
+from registration_core.observation import Observation
+from registration_core.polish import polish
+from registration_core.problem import Problem
+from registration_core.proposals import propose
+from registration_core.snap_config import StageConfig
+
+NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
+"""Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
+NEAR_ITERATIONS = 14
+"""Steps of each of them."""
+
+
+@dataclass(eq=False)
+class Search:
+    """Everything that the steps of one snap share."""
+
+    problem: Problem
+    observation: Observation
+    surface: Surface
+    rng: np.random.Generator
+    seed: int
+    started: float
+    """`time.perf_counter()` at the start."""
+    evaluations: int = 0
+    """Hypotheses compared with the image so far."""
+
+    def proposals(self) -> tuple[Array32, Array32]:
+        """The best proposals (N, 3, 4), best first, and their agreement (N,)."""
+        config = self.problem.config
+        poses = propose(
+            self.problem.prior, config.spread.search, self.surface, self.observation.grid, config.proposals,
+            self.rng
+        )  # fmt: skip
+        ring = self.surface.ring.shape[2] // 4
+        scores = self._agreement(
+            poses, config.wide_points, ring, config.wide_epsilon, config.agreement.wide_softening, False
+        )
+        return ranked(poses, scores, config.wide_kept)
+
+    def refined(self, poses: Array32, scores: Array32, stage: StageConfig) -> tuple[Array32, Array32]:
+        """The distinct modes among poses (N, 3, 4), polished and weighed anew, best first."""
+        model = self.problem.model
+        if len(model.symmetries) > 1:
+            poses = poses.copy()
+            move_to_nearest_twin(poses, model.symmetries, self.problem.prior.start)
+        kept = distinct(poses, scores, stage.modes, stage.niche_translation, stage.niche_rotation)
+        tukey = (stage.tukey_start, stage.tukey_end)
+        points = self._at_most(stage.points)
+        poses = polish(
+            poses[kept], self.surface, self.observation.grid, model.radius, points, stage.iterations, tukey
+        )
+        self.evaluations += len(poses) * stage.iterations
+        ring = self.surface.ring.shape[2]
+        return ranked(poses, self._agreement(poses, stage.points, ring, stage.epsilon, 1.0, True), len(poses))
+
+    def polished_start(self) -> Array32:
+        """The operator's pose polished with kernels of several widths (3, 3, 4): the near candidates."""
+        start = self.problem.prior.start[None]
+        points = self._at_most(self.surface.points.shape[2])
+        self.evaluations += NEAR_ITERATIONS * len(NEAR_TUKEY)
+        return np.concatenate(
+            [
+                polish(
+                    start, self.surface, self.observation.grid, self.problem.model.radius, points,
+                    NEAR_ITERATIONS, tukey,
+                )
+                for tukey in NEAR_TUKEY
+            ]
+        )  # fmt: skip
+
+    def _at_most(self, points: int) -> int:
+        return min(points, self.surface.points.shape[2])
+
+    def _agreement(
+        self, poses: Array32, points: int, ring: int, epsilon: float, softening: float, with_normals: bool
+    ) -> Array32:
+        agreement = np.empty(len(poses), np.float32)
+        sparse_agreement(
+            poses, self.surface, self.observation.grid, self.problem.prior, self._at_most(points), ring,
+            f4(epsilon), with_normals, agreement_weights(self.problem.config.agreement, softening), agreement,
+        )  # fmt: skip
+        self.evaluations += len(poses)
+        return agreement
+
+
+def ranked(poses: Array32, scores: Array32, most: int) -> tuple[Array32, Array32]:
+    """The `most` best poses (N, 3, 4) and their scores, best first."""
+    order = np.argsort(-scores, kind="stable")[:most]
+    return poses[order], scores[order]

@@ -1,0 +1,155 @@
+"""Refine an operator's pose against a depth image: `q* = argmax_q P(q | q_u, o, Z_d)`.
+
+The fast method weighs data-driven proposals with a sparse viewpoint model, keeps several modes alive while
+it anneals and polishes them, and lets the winner replace the operator's pose only where the evidence asks
+for it. The particle filter of Ye et al., "Human-in-the-loop Pose Estimation via Shared Autonomy" (IUI
+2021), is kept as the reference.
+"""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import trimesh
+from numpy.typing import ArrayLike
+
+from registration_core import pose
+from registration_core.agreement import surface_of
+from registration_core.camera import Intrinsics
+from registration_core.estimate import Estimate, SnapStep
+from registration_core.kernels import to_rows
+from registration_core.likelihood import RenderedLikelihood
+from registration_core.object_model import ObjectModel
+from registration_core.observation import observe
+from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
+from registration_core.problem import checked_problem, region_of_interest
+from registration_core.rasterizer import render_depth
+from registration_core.report import nothing_seen, outcome, progress, verdict
+from registration_core.search import Search
+from registration_core.selection import judge
+from registration_core.snap_config import ParticleFilterConfig, SnapConfig
+
+__all__ = ["region_of_interest", "seed_of", "snap", "snap_steps", "warm_up"]
+
+
+def snap(
+    model: ObjectModel,
+    depth: ArrayLike,
+    camera: Intrinsics,
+    T_camera_object: ArrayLike,
+    config: SnapConfig | None = None,
+    rng: np.random.Generator | None = None,
+    start_spread: tuple[float, float] | None = None,
+) -> Estimate:
+    """Refine the operator's pose of an object against a depth image.
+
+    Args:
+        depth: (H, W), metres, 0 = no measurement.
+        T_camera_object: (4, 4), the operator's pose.
+        config: `SnapConfig()` where it is None.
+        rng: the source of all randomness; fresh entropy where it is None. See `Estimate.seed`.
+        start_spread: (metres, radians) by which the start may be off, from the last drag's size; None =
+        unknown.
+
+    Raises:
+        ValueError: naming the argument that is wrong, and how.
+    """
+    for step in snap_steps(model, depth, camera, T_camera_object, config, rng, start_spread):
+        if step.estimate is not None:
+            return step.estimate
+    raise AssertionError("the last step carries the estimate")
+
+
+def snap_steps(
+    model: ObjectModel,
+    depth: ArrayLike,
+    camera: Intrinsics,
+    T_camera_object: ArrayLike,
+    config: SnapConfig | None = None,
+    rng: np.random.Generator | None = None,
+    start_spread: tuple[float, float] | None = None,
+) -> Iterator[SnapStep]:
+    """`snap` step by step, so that a caller can show progress and stop early; the last step has the estimate.
+
+    Inputs are checked at once, not when the first step is asked for.
+    """
+    started = time.perf_counter()
+    config = SnapConfig() if config is None else config
+    problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread)
+    seed = seed_of(rng)
+    rng = np.random.default_rng(seed)
+    observation = observe(
+        problem.depth, camera, problem.start[:3, 3], problem.model, config.observation, rng,
+    )  # fmt: skip
+    search = Search(problem, observation, surface_of(problem.model), rng, seed, started)
+    if observation.measured < config.observation.min_pixels:
+        return iter([nothing_seen(search, 1)])
+    return _filter_steps(search) if config.method == "particle_filter" else _viewpoint_steps(search)
+
+
+def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
+    """The fast method: propose, then anneal and polish ever fewer modes, then choose."""
+    config, prior = search.problem.config, search.problem.prior
+    iterations = len(config.stages) + 2
+    poses, scores = search.proposals()
+    yield progress(search, 1, iterations, poses[:625])
+    for iteration, stage in enumerate(config.stages, start=2):
+        poses, scores = search.refined(poses, scores, stage)
+        yield progress(search, iteration, iterations, poses)
+    near = search.polished_start()
+    candidates = np.concatenate([prior.start[None], near, poses])
+    judgement = judge(
+        candidates, len(near), search.problem.model, search.observation.grid, prior, config.selection
+    )
+    search.evaluations += len(candidates)
+    yield verdict(search, iterations, candidates, judgement)
+
+
+def _filter_steps(search: Search) -> Iterator[SnapStep]:
+    """The paper's method: importance resampling of particles weighed by Eq. 3 to 5."""
+    problem, config = search.problem, search.problem.config.particle_filter
+    likelihood = RenderedLikelihood(
+        problem.model, problem.depth, problem.camera, problem.start[:3, 3],
+        problem.config.observation.reach, config,
+    )  # fmt: skip
+    spread = Noise(float(problem.prior.translation), float(problem.prior.rotation))
+    noise = Noise(config.noise_translation, config.noise_rotation)
+    poses = initial_poses(problem.start, spread, config.particles, search.rng)
+    particle_filter = ParticleFilter(likelihood, noise, poses, search.rng)
+    for iteration in range(1, config.iterations + 1):
+        particles = particle_filter.step()
+        search.evaluations += config.particles
+        order = np.argsort(-particles.log_weights, kind="stable")
+        ranked = to_rows(particles.poses[order])
+        if iteration < config.iterations:
+            yield progress(search, iteration, config.iterations, ranked)
+        else:
+            yield outcome(search, iteration, ranked, particles.log_weights[order])
+
+
+def seed_of(rng: np.random.Generator | None) -> int:
+    """A seed s such that a snap with `default_rng(s)` does the same as one with `rng`.
+
+    A generator that comes fresh from `default_rng(s)` has the seed s; from any other one a seed is drawn.
+    """
+    if rng is None:
+        return int(np.random.default_rng().integers(2**53))
+    drawn = int(rng.integers(2**53))
+    entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
+    if isinstance(entropy, int) and entropy < 2**64:
+        fresh = np.random.default_rng(entropy)
+        if int(fresh.integers(2**53)) == drawn and fresh.bit_generator.state == rng.bit_generator.state:
+            return entropy
+    return drawn
+
+
+def warm_up() -> None:
+    """Compile or load every kernel by a tiny snap of each method, so that the first real one is fast."""
+    box = trimesh.creation.box((0.08, 0.05, 0.03))
+    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
+    camera = Intrinsics(160, 120, 150.0, 150.0, 79.5, 59.5)
+    T = pose.exp([0.0, 0.0, 0.4, 0.5, 0.3, 0.0])
+    depth = render_depth(model, camera, T)
+    short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
+    for config in (SnapConfig(), short):
+        snap(model, depth, camera, T, config, np.random.default_rng(0))

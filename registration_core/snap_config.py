@@ -1,0 +1,264 @@
+"""Every constant of a snap, in small nested records with a default for each."""
+
+import dataclasses
+import math
+import typing
+from dataclasses import dataclass, field
+from typing import Any, Literal, Self
+
+MAX_COUNT = 1_000_000
+"""No count in a configuration may be larger: it comes from outside."""
+
+
+@dataclass(frozen=True)
+class ObservationConfig:
+    """How the depth image around the start is read."""
+
+    reach: float = 0.17
+    """How far beyond the object at the start a snap looks, metres."""
+    pixels_across: int = 30
+    """The image is reduced (by 2 or 4) as long as the object's diameter still spans this many pixels."""
+    depth_gap: float = 0.015
+    """Neighbouring pixels farther apart than this lie on different surfaces, metres."""
+    normal_radius: int = 2
+    """Normals are fitted to (2r + 1)^2 pixels."""
+    plane_tolerance: float = 0.008
+    """Pixels closer than this to the supporting plane belong to it, metres."""
+    plane_share: float = 0.15
+    """A plane counts as one only if it holds this share of the pixels, ..."""
+    plane_excess: float = 1.5
+    """... and this many times the object's silhouette: in a masked image a flat side of it is no support."""
+    plane_weight: float = 0.1
+    """What a plane pixel weighs, 1 for the others: not 0, for a flat object lies in its plane."""
+    plane_trials: int = 60
+    """RANSAC hypotheses."""
+    min_pixels: int = 40
+    """With fewer measured pixels about the object there is nothing to register to."""
+
+
+@dataclass(frozen=True)
+class SpreadConfig:
+    """How far off the start may be, where the caller does not say."""
+
+    translation: float = 0.04
+    """Metres."""
+    rotation: float = 0.5
+    """Radians."""
+    search: float = 1.4
+    """Proposals are drawn this many times wider than that."""
+
+
+@dataclass(frozen=True)
+class ProposalConfig:
+    """The poses that a snap starts from."""
+
+    count: int = 14_000
+    gaussian_share: float = 0.1
+    """Share drawn from the Gaussian about the start alone."""
+    ray_share: float = 0.1
+    """Share then shifted along the viewing ray onto the observed surface; the rest is also turned onto it."""
+    scales: tuple[float, ...] = (0.3, 0.7, 1.0, 1.5)
+    """Multiples of the spread that are cycled through."""
+    max_shift: float = 0.15
+    """A point is put on observed depth only if it is no farther off, metres."""
+    max_turn: float = 1.0
+    """A normal is turned onto the observed one only if the angle is smaller, radians."""
+    tries: int = 4
+    """Draws until a point falls on a measured pixel off the plane."""
+
+
+@dataclass(frozen=True)
+class AgreementConfig:
+    """Weights of the sparse agreement (likelihood.py)."""
+
+    free: float = 1.5
+    """Of surface claimed where the sensor saw through."""
+    missing: float = 0.05
+    """Of surface claimed where there is no measurement."""
+    ring: float = 1.5
+    """Of observed surface that goes on beyond the silhouette."""
+    clear: float = 0.3
+    """Reward of a silhouette before a background that lies farther."""
+    area: float = 0.6
+    """How much a view that shows more of the object counts more."""
+    prior: float = 0.03
+    """Of the heavy-tailed prior about the start."""
+    wide_softening: float = 0.6
+    """Factor on `free` and `ring` in the first stage, where no hypothesis is exact yet."""
+
+
+@dataclass(frozen=True)
+class StageConfig:
+    """One stage of the annealing: keep distinct modes, polish them, weigh them anew."""
+
+    modes: int
+    """Distinct hypotheses that go on to this stage."""
+    niche_translation: float
+    """Modes are distinct if they are farther apart than this, metres, ..."""
+    niche_rotation: float
+    """... or than this, radians."""
+    iterations: int
+    """Gauss-Newton steps."""
+    tukey_start: float
+    """Width of the robust kernel in the first step, metres."""
+    tukey_end: float
+    """Width of the robust kernel in the last step, metres."""
+    points: int
+    """Surface points in the polish and in the weight after it."""
+    epsilon: float
+    """Distance at which agreement ends, metres."""
+
+
+@dataclass(frozen=True)
+class SelectionConfig:
+    """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
+
+    prior: float = 2.25
+    """Weight of the heavy-tailed prior about the start."""
+    gain_near: float = 0.5
+    """The polished start replaces the start only if it scores better by this much."""
+    gain_far: float = 0.8
+    """Another mode replaces that only if it scores better by this much."""
+    min_match: float = 0.04
+    """With less of the silhouette matched than this, the start is kept."""
+    weights: tuple[float, ...] = (8.0, 1.5, 0.0, 3.3, 0.0, 0.5, 2.7, 5.4, 1.6, 0.65, 1.15, 3.15)
+    """Of the twelve residual classes of selection.py, in their order."""
+
+
+@dataclass(frozen=True)
+class ConfidenceConfig:
+    """Logistic calibration of the confidence (confidence.py)."""
+
+    temperature: float = 2.0
+    """Of the softmax that shares the mass among the modes."""
+    mode_radius: float = 0.07
+    """Hypotheses closer than this share of the diameter are one mode."""
+    intercept: float = -5.0
+    mass: float = 7.9
+    """Weight of the share of the belief that the winning mode has."""
+    match: float = 4.7
+    """Weight of the share of the claimed surface that was measured where it should be."""
+
+
+@dataclass(frozen=True)
+class ParticleFilterConfig:
+    """The filter of the paper, which leaves the spread and the noise open."""
+
+    particles: int = 625
+    iterations: int = 640
+    epsilon: float = 0.01
+    """Eq. 3, metres."""
+    alpha: float = 0.5
+    """Eq. 5, weight of the share of observed points that are explained."""
+    beta: float = 0.5
+    """Eq. 5, weight of the share of rendered points that agree."""
+    noise_translation: float = 0.002
+    """Standard deviation added to each axis after resampling, metres."""
+    noise_rotation: float = 0.02
+    """The same for the rotation vector, radians."""
+    pixels_across: int = 40
+    """Every 2nd, 4th or 8th pixel is used as long as the object's diameter still spans this many."""
+
+
+DEFAULT_STAGES = (
+    StageConfig(600, 0.015, 0.25, 4, 0.03, 0.012, 96, 0.010),
+    StageConfig(80, 0.008, 0.12, 6, 0.012, 0.005, 200, 0.006),
+    StageConfig(24, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+)
+
+
+@dataclass(frozen=True)
+class SnapConfig:
+    """All constants of a snap; the defaults are the fast method."""
+
+    method: Literal["viewpoint", "particle_filter"] = "viewpoint"
+    """Sparse viewpoint model with polished modes, or the paper's particle filter on rendered depth."""
+    observation: ObservationConfig = field(default_factory=ObservationConfig)
+    spread: SpreadConfig = field(default_factory=SpreadConfig)
+    proposals: ProposalConfig = field(default_factory=ProposalConfig)
+    wide_points: int = 64
+    """Surface points of a proposal that are looked up."""
+    wide_epsilon: float = 0.02
+    """Distance at which agreement of a proposal ends, metres."""
+    wide_kept: int = 5000
+    """Proposals of which the distinct modes are taken."""
+    agreement: AgreementConfig = field(default_factory=AgreementConfig)
+    stages: tuple[StageConfig, ...] = DEFAULT_STAGES
+    selection: SelectionConfig = field(default_factory=SelectionConfig)
+    confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
+    particle_filter: ParticleFilterConfig = field(default_factory=ParticleFilterConfig)
+
+    @classmethod
+    def paper(cls) -> Self:
+        """The method of Ye et al. (IUI 2021): 625 particles, 640 iterations, rendered depth, Eq. 3 to 5."""
+        return cls(method="particle_filter")
+
+    def to_dict(self) -> dict[str, Any]:
+        """All fields as JSON values."""
+        return _plain(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> "SnapConfig":
+        """The configuration whose fields are `values` over the defaults, or over `{"preset": "paper"}`.
+
+        Raises:
+            ValueError: naming the field that is unknown or of the wrong type.
+        """
+        if not isinstance(values, dict):
+            raise ValueError("config must be an object of named fields")
+        values = dict(values)
+        presets = {"default": SnapConfig(), "paper": SnapConfig.paper()}
+        preset = values.pop("preset", "default")
+        if not isinstance(preset, str) or preset not in presets:
+            raise ValueError(f"config.preset must be one of {', '.join(presets)}; it is {preset!r}")
+        return _merged(presets[preset], values, "config")
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def _merged(base: Any, values: Any, name: str) -> Any:
+    """The dataclass `base` with `values` in place of its fields."""
+    if not isinstance(values, dict):
+        raise ValueError(f"{name} must be an object of named fields; it is {values!r}")
+    kinds = typing.get_type_hints(type(base))
+    for key in values:
+        if key not in kinds:
+            raise ValueError(f"{name}.{key} is no field; there are {', '.join(kinds)}")
+    changes = {
+        key: _checked(kinds[key], getattr(base, key), value, f"{name}.{key}") for key, value in values.items()
+    }
+    return dataclasses.replace(base, **changes)
+
+
+def _checked(kind: Any, base: Any, value: Any, name: str) -> Any:
+    """`value` as a field of type `kind`, whose value so far is `base`."""
+    if dataclasses.is_dataclass(kind):
+        return _merged(base, value, name)
+    if typing.get_origin(kind) is Literal:
+        if value not in typing.get_args(kind):
+            raise ValueError(f"{name} must be one of {', '.join(typing.get_args(kind))}; it is {value!r}")
+        return value
+    if typing.get_origin(kind) is tuple:
+        return _checked_items(typing.get_args(kind)[0], base, value, name)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if kind is int:
+        if not is_number or not isinstance(value, int) or not 1 <= value <= MAX_COUNT:
+            raise ValueError(f"{name} must be a whole number from 1 to {MAX_COUNT}; it is {value!r}")
+        return value
+    assert kind is float
+    if not is_number or not math.isfinite(value):
+        raise ValueError(f"{name} must be a finite number; it is {value!r}")
+    return float(value)
+
+
+def _checked_items(kind: Any, base: Any, value: Any, name: str) -> Any:
+    if not isinstance(value, list | tuple) or not value:
+        raise ValueError(f"{name} must be a list with at least one item; it is {value!r}")
+    if kind is float and len(value) != len(base):
+        raise ValueError(f"{name} must have {len(base)} numbers; it has {len(value)}")
+    last = len(base) - 1
+    return tuple(_checked(kind, base[min(i, last)], item, f"{name}[{i}]") for i, item in enumerate(value))

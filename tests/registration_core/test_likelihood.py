@@ -1,0 +1,72 @@
+"""Eq. 3 to 5 against a plain computation with numpy."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from registration_core import pose
+from registration_core.camera import depth_to_points
+from registration_core.kernels import centred
+from registration_core.likelihood import RenderedLikelihood
+from registration_core.object_model import ObjectModel
+from registration_core.rasterizer import render_depth
+from registration_core.snap_config import ParticleFilterConfig
+from registration_core.viewpoint_model import viewpoint_model
+from tests.registration_core.simple_scene import CAMERA, SimpleScene, standing_tool
+
+EVERY_PIXEL = ParticleFilterConfig(pixels_across=1_000)
+
+
+@pytest.fixture(scope="module")
+def scene() -> SimpleScene:
+    return standing_tool()
+
+
+def likelihood_of(scene: SimpleScene, config: ParticleFilterConfig = EVERY_PIXEL) -> RenderedLikelihood:
+    centre = pose.apply(scene.truth, scene.model.centre)
+    return RenderedLikelihood(viewpoint_model(scene.model), scene.depth, CAMERA, centre, 0.17, config)
+
+
+def plain_weight(scene: SimpleScene, T: NDArray[np.float64], config: ParticleFilterConfig) -> float:
+    """Eq. 5 as it is written, over the whole image."""
+    model: ObjectModel = scene.model
+    rendered_depth = render_depth(model, CAMERA, T)
+    rendered, observed = depth_to_points(rendered_depth, CAMERA), depth_to_points(scene.depth, CAMERA)
+    near = np.linalg.norm(observed - pose.apply(T, model.centre), axis=-1) <= model.radius + config.epsilon
+    in_crop = near & (scene.depth > 0)
+    both = (rendered_depth > 0) & (scene.depth > 0)
+    inliers = both & (np.linalg.norm(rendered - observed, axis=-1) < config.epsilon)  # Eq. 3
+    count = inliers.sum()  # Eq. 4
+    return config.alpha * count / in_crop.sum() + config.beta * count / (rendered_depth > 0).sum()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_equals_equation_5(scene, seed) -> None:
+    T = pose.perturbed(scene.truth, 0.01, 0.2, np.random.default_rng(seed))
+    log_weight = likelihood_of(scene)(centred(T, scene.model.centre)[None])
+    assert np.exp(log_weight[0]) == pytest.approx(plain_weight(scene, T, EVERY_PIXEL), rel=0.01)
+
+
+def test_no_hypothesis_weighs_more_than_a_perfect_one(scene) -> None:
+    moved = [pose.perturbed(scene.truth, 0.1, 1.0, np.random.default_rng(k)) for k in range(200)]
+    poses = centred(np.stack(moved), scene.model.centre)
+    assert likelihood_of(scene, ParticleFilterConfig())(poses).max() <= 0.0
+
+
+def test_truth_beats_what_lies_beside_it(scene) -> None:
+    moved = [pose.perturbed(scene.truth, 0.02, 0.3, np.random.default_rng(k)) for k in range(20)]
+    poses = centred(np.stack([scene.truth, *moved]), scene.model.centre)
+    log_weights = likelihood_of(scene, ParticleFilterConfig())(poses)
+    assert log_weights.argmax() == 0
+
+
+def test_fewer_pixels_give_about_the_same_weight(scene) -> None:
+    T = centred(scene.truth, scene.model.centre)[None]
+    coarse = np.exp(likelihood_of(scene, ParticleFilterConfig(pixels_across=20))(T))
+    np.testing.assert_allclose(coarse, np.exp(likelihood_of(scene)(T)), atol=0.06)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, -1.0), (5.0, 0.0, 1.0)])
+def test_hypothesis_out_of_sight_has_no_weight(scene, place) -> None:
+    T = pose.exp([*place, 0.0, 0.0, 0.0])[None]
+    assert likelihood_of(scene)(T)[0] == -np.inf

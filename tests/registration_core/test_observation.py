@@ -1,0 +1,75 @@
+"""Reduction, normals and the plane of a depth image that is known."""
+
+import numpy as np
+import pytest
+
+from registration_core import Intrinsics, SnapConfig, pose
+from registration_core.camera import depth_to_points
+from registration_core.observation import observe, reduction, window
+from registration_core.rasterizer import render_depth
+from registration_core.viewpoint_model import viewpoint_model
+from tests.registration_core.simple_scene import block, model_of, standing_tool, tool
+
+CONFIG = SnapConfig().observation
+CENTRE = np.array([0.0, 0.0, 0.8])
+
+
+def look(depth, camera, centre=CENTRE):
+    model = viewpoint_model(tool())
+    return observe(depth, camera, centre, model, CONFIG, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("focal", [150.0, 300.0, 1200.0])
+def test_tilted_plane_keeps_its_depth_and_normal_at_every_reduction(focal) -> None:
+    size = int(focal * 0.8)
+    camera = Intrinsics(size, size, focal, focal, size / 2 - 0.5, size / 2 - 0.5)
+    plane = model_of(block((3.0, 3.0, 0.01)))
+    T = pose.exp([0.0, 0.0, 0.8, 0.5, 0.2, 0.0])
+    grid = look(render_depth(plane, camera, T), camera).grid
+    rows, columns = grid.depth.shape
+    reduced = Intrinsics(columns, rows, *map(float, (grid.fx, grid.fy, grid.cx, grid.cy)))
+    points = depth_to_points(grid.depth, reduced)[grid.depth > 0]
+    off_plane = (points - T[:3, 3]) @ T[:3, 2]
+    assert np.abs(off_plane - np.median(off_plane)).max() < 0.002
+    inner = grid.normals[:, 4:-4, 4:-4]
+    np.testing.assert_allclose(np.abs(np.einsum("chw,c->hw", inner, T[:3, 2])), 1.0, atol=2e-3)
+    assert (inner[2] < 0).all()  # towards the camera
+
+
+def test_table_weighs_little_and_the_object_much() -> None:
+    scene = standing_tool()
+    centre = pose.apply(scene.truth, scene.model.centre)
+    grid = look(scene.depth, scene.camera, centre).grid
+    assert 0.2 < (grid.weight < 1).mean() < 0.95
+    row = round(float(centre[1] / centre[2] * grid.fy + grid.cy))
+    column = round(float(centre[0] / centre[2] * grid.fx + grid.cx))
+    assert grid.weight[row, column] == 1.0
+
+
+def test_flat_side_of_a_masked_object_is_no_table() -> None:
+    scene = standing_tool()
+    alone = render_depth(scene.model, scene.camera, scene.truth)
+    centre = pose.apply(scene.truth, scene.model.centre)
+    assert (look(alone, scene.camera, centre).grid.weight == 1.0).all()
+
+
+def test_border_is_never_measured() -> None:
+    depth = look(
+        np.full((240, 320), 0.8, np.float32), Intrinsics(320, 240, 262.0, 262.0, 159.5, 119.5)
+    ).grid.depth
+    assert not depth[[0, -1]].any()
+    assert not depth[:, [0, -1]].any()
+
+
+def test_window_is_aligned_and_within_the_image() -> None:
+    camera = Intrinsics(323, 241, 262.5, 262.5, 159.5, 119.5)
+    left, top, right, bottom = window(camera, np.array([0.05, 0.02, 0.9]), 0.1, 0.1)
+    assert left % 8 == top % 8 == 0
+    assert 0 <= left < right <= 323
+    assert 0 <= top < bottom <= 241
+
+
+@pytest.mark.parametrize(("distance", "block"), [(0.2, 4), (0.8, 2), (3.0, 1)])
+def test_object_stays_resolved(distance, block) -> None:
+    camera = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)
+    assert reduction(camera, 0.12, distance, 30, 4) == block

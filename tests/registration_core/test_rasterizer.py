@@ -1,0 +1,92 @@
+"""The z-buffer against Open3D's ray caster, and against what geometry says."""
+
+from pathlib import Path
+
+import numpy as np
+import open3d
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from registration_core import Intrinsics, ObjectModel, pose
+from registration_core.rasterizer import render_depth
+
+CAMERA = Intrinsics(320, 240, 300.0, 310.0, 155.2, 121.7)
+
+
+def ray_cast(model: ObjectModel, camera: Intrinsics, T: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The same image by Open3D: z of the first hit of the ray through each pixel's centre."""
+    scene = open3d.t.geometry.RaycastingScene()
+    scene.add_triangles(
+        pose.apply(T, model.vertices).astype(np.float32), np.asarray(model.faces, dtype=np.uint32)
+    )
+    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    directions = np.stack(
+        [(columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy, np.ones(columns.shape)], axis=-1
+    )
+    rays = np.concatenate([np.zeros_like(directions), directions], axis=-1).astype(np.float32)
+    z = scene.cast_rays(open3d.core.Tensor(rays))["t_hit"].numpy()
+    return np.where(np.isfinite(z), z, 0)
+
+
+def model_of(mesh: trimesh.Trimesh) -> ObjectModel:
+    return ObjectModel(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))
+
+
+def assert_equal_images(drawn: NDArray[np.float32], cast: NDArray[np.float32]) -> None:
+    """Equal to rounding; a ray through an edge may fall on either side of it."""
+    assert (drawn > 0).sum() > 100
+    assert ((drawn > 0) != (cast > 0)).sum() <= 3
+    both = (drawn > 0) & (cast > 0)
+    apart = np.abs(drawn - cast)[both]
+    assert (apart > 1e-5).sum() <= 3
+    assert np.median(apart) < 1e-6
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0, 0.5), (0.25, -0.15, 0.5), (0.01, 0.0, 0.12)])
+@pytest.mark.parametrize("mesh", ["bunny/models/obj_000001.ply", "ycbv/models/obj_000014.ply"])
+def test_equals_ray_casting_on_real_meshes(
+    shared_data: Path, mesh: str, centre: tuple[float, float, float]
+) -> None:
+    model = ObjectModel.load(shared_data / mesh, unit="mm")
+    T = pose.exp([*centre, 1.0, 0.4, -2.0])
+    T[:3, 3] -= T[:3, :3] @ model.centre
+    assert_equal_images(render_depth(model, CAMERA, T), ray_cast(model, CAMERA, T))
+
+
+def test_open_surface_is_drawn_from_both_sides() -> None:
+    cup = trimesh.creation.cylinder(radius=0.05, height=0.1, sections=40)
+    keep = cup.face_normals[:, 2] < 0.9
+    model = ObjectModel(np.asarray(cup.vertices), np.asarray(cup.faces[keep], dtype=np.int32))
+    T = pose.exp([0.0, 0.0, 0.4, np.pi + 0.5, 0.0, 0.0])
+    drawn = render_depth(model, CAMERA, T)
+    assert_equal_images(drawn, ray_cast(model, CAMERA, T))
+    flipped = ObjectModel(model.vertices, model.faces[:, ::-1].copy())
+    np.testing.assert_allclose(render_depth(flipped, CAMERA, T), drawn, atol=1e-6)
+
+
+def test_fronto_parallel_square_covers_the_pixels_whose_centres_it_holds() -> None:
+    camera = Intrinsics(20, 20, 10.0, 10.0, 10.0, 10.0)
+    square = np.array([[-0.25, -0.25, 0], [0.25, -0.25, 0], [0.25, 0.25, 0], [-0.25, 0.25, 0]])
+    model = ObjectModel(square, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+    depth = render_depth(model, camera, pose.exp([0.0, 0.0, 1.0, 0.0, 0.0, 0.0]))
+    expected = np.zeros((20, 20), dtype=np.float32)
+    expected[8:13, 8:13] = 1.0  # from -2.5 to 2.5 pixels about pixel (10, 10)
+    np.testing.assert_allclose(depth, expected, atol=1e-7)
+
+
+def test_floor_under_the_camera_is_clipped_at_the_near_plane() -> None:
+    half = 50.0
+    corners = np.array([[-half, 0, -half], [half, 0, -half], [half, 0, half], [-half, 0, half]])
+    model = ObjectModel(corners, np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32))
+    depth = render_depth(model, CAMERA, pose.exp([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+    rows = np.arange(CAMERA.height)
+    below = rows > CAMERA.cy + 10
+    expected = CAMERA.fy / (rows[below] - CAMERA.cy)  # z of the ray at y = 1
+    np.testing.assert_allclose(depth[below], np.repeat(expected[:, None], CAMERA.width, 1), rtol=1e-5)
+    assert not depth[rows < CAMERA.cy].any()
+
+
+def test_nothing_behind_the_camera_is_drawn() -> None:
+    model = model_of(trimesh.creation.box((0.1, 0.1, 0.1)))
+    assert not render_depth(model, CAMERA, pose.exp([0.0, 0.0, -0.5, 0.0, 0.0, 0.0])).any()

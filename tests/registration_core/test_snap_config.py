@@ -1,0 +1,58 @@
+"""Configurations to JSON and back, and what is refused."""
+
+import json
+
+import pytest
+
+from registration_core import SnapConfig
+
+
+@pytest.mark.parametrize("config", [SnapConfig(), SnapConfig.paper()])
+def test_survives_json(config) -> None:
+    assert SnapConfig.from_dict(json.loads(json.dumps(config.to_dict()))) == config
+
+
+def test_paper_is_to_the_letter() -> None:
+    config = SnapConfig.paper()
+    assert config.method == "particle_filter"
+    assert (config.particle_filter.particles, config.particle_filter.iterations) == (625, 640)
+    assert SnapConfig.from_dict({"preset": "paper"}) == config
+
+
+def test_partial_values_lie_over_the_defaults() -> None:
+    config = SnapConfig.from_dict({"proposals": {"count": 100}, "wide_epsilon": 1})
+    assert config.proposals.count == 100
+    assert config.wide_epsilon == 1.0
+    assert config.proposals.scales == SnapConfig().proposals.scales
+    assert SnapConfig.from_dict({}) == SnapConfig()
+
+
+def test_stages_may_be_fewer() -> None:
+    stage = SnapConfig().to_dict()["stages"][0]
+    assert len(SnapConfig.from_dict({"stages": [stage]}).stages) == 1
+
+
+@pytest.mark.parametrize(
+    ("values", "name"),
+    [
+        ({"speed": 1}, "config.speed"),
+        ({"proposals": {"number": 1}}, "config.proposals.number"),
+        ({"proposals": 3}, "config.proposals"),
+        ({"proposals": {"count": 1.5}}, "config.proposals.count"),
+        ({"proposals": {"count": True}}, "config.proposals.count"),
+        ({"proposals": {"count": 0}}, "config.proposals.count"),
+        ({"proposals": {"count": 10**9}}, "config.proposals.count"),
+        ({"proposals": {"scales": [1.0]}}, "config.proposals.scales"),
+        ({"proposals": {"scales": [1.0, "a", 1.0, 1.0]}}, r"config.proposals.scales\[1\]"),
+        ({"wide_epsilon": "2 cm"}, "config.wide_epsilon"),
+        ({"wide_epsilon": float("nan")}, "config.wide_epsilon"),
+        ({"stages": []}, "config.stages"),
+        ({"stages": [{"points": "all"}]}, r"config.stages\[0\].points"),
+        ({"method": "magic"}, "config.method"),
+        ({"preset": "fastest"}, "config.preset"),
+        ([], "config"),
+    ],
+)
+def test_wrong_fields_are_named(values, name) -> None:
+    with pytest.raises(ValueError, match=name):
+        SnapConfig.from_dict(values)
