@@ -1,0 +1,225 @@
+"""Who may do what: users, roles, passwords, login sessions, API tokens and one-time sign-in links."""
+
+import hashlib
+import secrets
+import threading
+import time
+from dataclasses import dataclass
+from datetime import timedelta
+from enum import StrEnum
+
+from pwdlib import PasswordHash
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from app.database import Database
+from app.tables import Credential, User, utc_now
+
+LOGIN_LIFETIME = timedelta(days=14)
+LINK_LIFETIME = timedelta(hours=12)
+FREE_ATTEMPTS = 5
+"""Wrong passwords for one name before waiting begins; it doubles with each further one."""
+LONGEST_WAIT_SECONDS = 300.0
+SHORTEST_PASSWORD = 8
+
+
+class Role(StrEnum):
+    """What a user may do; each role may do all that the ones before it may."""
+
+    OPERATOR = "operator"
+    REVIEWER = "reviewer"
+    ADMIN = "admin"
+
+    def includes(self, other: "Role") -> bool:
+        """Whether this role may do what `other` may."""
+        order = list(Role)
+        return order.index(self) >= order.index(other)
+
+
+class Actor(StrEnum):
+    """Who acted, as the log marks it."""
+
+    HUMAN = "human"
+    SCRIPT = "script"
+    MACHINE = "machine"
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Whoever a request comes from."""
+
+    user_id: int
+    name: str
+    role: Role
+    actor: Actor
+
+
+class SignInError(Exception):
+    """The credentials are not accepted; the message may be shown."""
+
+
+class TooManyAttemptsError(SignInError):
+    """Signing in under this name has to wait."""
+
+
+class Auth:
+    """Users and their credentials in the database; only hashes of secrets are kept."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._passwords = PasswordHash.recommended()
+        self._unknown_user_hash = self._passwords.hash(secrets.token_urlsafe())
+        self._throttle = _Throttle()
+
+    def create_user(self, name: str, role: Role, password: str | None = None) -> User:
+        """Add a user; without a password only links and tokens sign in.
+
+        Raises:
+            ValueError: where the name is empty or taken, or the password too short.
+        """
+        name = name.strip()
+        if not name:
+            raise ValueError("a user's name must not be empty")
+        if password is not None and len(password) < SHORTEST_PASSWORD:
+            raise ValueError(f"a password needs at least {SHORTEST_PASSWORD} characters")
+        with self._database.write() as session:
+            if _find_user(session, name):
+                raise ValueError(f"there already is a user named {name!r}; choose another name")
+            user = User(name=name, role=role, password_hash=password and self._passwords.hash(password))
+            session.add(user)
+            session.flush()
+            return user
+
+    def ensure_user(self, name: str, role: Role) -> User:
+        """The user of this name, made where there is none.
+
+        Raises:
+            ValueError: where the user exists with another role.
+        """
+        with self._database.read() as session:
+            user = _find_user(session, name)
+        if user is None:
+            return self.create_user(name, role)
+        if user.role != role:
+            raise ValueError(f"user {name!r} has the role {user.role}, not {role}; choose another name")
+        return user
+
+    def sign_in(self, name: str, password: str) -> str:
+        """A new login session's secret, for the right name and password.
+
+        Raises:
+            SignInError: where they are wrong, or were wrong too often just now.
+        """
+        name = name.strip()
+        self._throttle.check(name)
+        with self._database.read() as session:
+            user = _find_user(session, name)
+        # An unknown name takes as long as a known one, so that names cannot be guessed by the clock.
+        expected = user.password_hash if user and user.password_hash else self._unknown_user_hash
+        if not self._passwords.verify(password, expected) or user is None or user.password_hash is None:
+            self._throttle.failed(name)
+            raise SignInError("this name and password do not belong together; check both and try again")
+        self._throttle.succeeded(name)
+        return self._issue("session", user.id, LOGIN_LIFETIME)
+
+    def sign_in_with_link(self, secret: str) -> str:
+        """A new login session's secret for a one-time link, which is used up by it.
+
+        Raises:
+            SignInError: where the link is unknown, used or too old.
+        """
+        with self._database.write() as session:
+            link = _find_credential(session, "link", secret)
+            if link is None:
+                raise SignInError("this sign-in link was used before or is too old; ask for a new one")
+            session.delete(link)
+        return self._issue("session", link.user_id, LOGIN_LIFETIME)
+
+    def sign_out(self, secret: str) -> None:
+        """End a login session."""
+        with self._database.write() as session:
+            session.execute(delete(Credential).where(Credential.secret_hash == _hashed(secret)))
+
+    def create_link(self, user_id: int) -> str:
+        """The secret of a new one-time sign-in link."""
+        return self._issue("link", user_id, LINK_LIFETIME)
+
+    def create_token(self, name: str, role: Role) -> str:
+        """A new API token for the user `name`, who is made where there is none."""
+        return self._issue("token", self.ensure_user(name, role).id, None, name)
+
+    def identify_session(self, secret: str) -> Identity | None:
+        """Whose login session this is."""
+        return self._identify("session", secret, Actor.HUMAN)
+
+    def identify_token(self, secret: str) -> Identity | None:
+        """Whose API token this is."""
+        return self._identify("token", secret, Actor.SCRIPT)
+
+    def _identify(self, kind: str, secret: str, actor: Actor) -> Identity | None:
+        with self._database.read() as session:
+            credential = _find_credential(session, kind, secret)
+        if credential is None:
+            return None
+        user = credential.user
+        return Identity(user.id, user.name, Role(user.role), actor)
+
+    def _issue(self, kind: str, user_id: int, lifetime: timedelta | None, name: str = "") -> str:
+        secret = secrets.token_urlsafe(32)
+        with self._database.write() as session:
+            session.execute(delete(Credential).where(Credential.expires_at < utc_now()))
+            session.add(
+                Credential(
+                    kind=kind,
+                    secret_hash=_hashed(secret),
+                    user_id=user_id,
+                    name=name,
+                    expires_at=utc_now() + lifetime if lifetime else None,
+                )
+            )
+        return secret
+
+
+class _Throttle:
+    """Makes guessing passwords slow, name by name."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._failures: dict[str, tuple[int, float]] = {}
+
+    def check(self, name: str) -> None:
+        with self._lock:
+            count, last = self._failures.get(name, (0, 0.0))
+        if count < FREE_ATTEMPTS:
+            return
+        wait = min(LONGEST_WAIT_SECONDS, 2.0 ** (count - FREE_ATTEMPTS)) - (time.monotonic() - last)
+        if wait > 0:
+            raise TooManyAttemptsError(
+                f"too many wrong passwords for this name; wait {wait:.0f} seconds and try again"
+            )
+
+    def failed(self, name: str) -> None:
+        with self._lock:
+            count, _ = self._failures.get(name, (0, 0.0))
+            self._failures[name] = (count + 1, time.monotonic())
+
+    def succeeded(self, name: str) -> None:
+        with self._lock:
+            self._failures.pop(name, None)
+
+
+def _hashed(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def _find_user(session: Session, name: str) -> User | None:
+    return session.scalar(select(User).where(User.name == name.strip()))
+
+
+def _find_credential(session: Session, kind: str, secret: str) -> Credential | None:
+    credential = session.scalar(
+        select(Credential).where(Credential.kind == kind, Credential.secret_hash == _hashed(secret))
+    )
+    if credential is None or (credential.expires_at is not None and credential.expires_at < utc_now()):
+        return None
+    return credential

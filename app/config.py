@@ -1,0 +1,48 @@
+"""Settings: a default for everything, changed by environment variables, an env file or the command line."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+PROJECT = Path(__file__).resolve().parents[1]
+"""Where `static`, `migrations` and `scenes` lie."""
+
+
+class Settings(BaseSettings):
+    """What one running Snap6D needs to know; each field is an environment variable `SNAP6D_<FIELD>`."""
+
+    model_config = SettingsConfigDict(env_prefix="SNAP6D_", env_file=".env", extra="ignore")
+
+    host: str = "127.0.0.1"
+    """Address that the one public port listens on."""
+    port: Annotated[int, Field(ge=0, le=65535)] = 8000
+    """The public port; 0 takes a free one."""
+    state_dir: Path = PROJECT / "state"
+    """Database, stored files and exports."""
+    database_url: str = ""
+    """SQLAlchemy address of another database; empty: SQLite in `state_dir`."""
+    scheduler_address: str = ""
+    """Dask scheduler of a cluster; empty: worker processes on this machine."""
+    workers: Annotated[int, Field(ge=1, le=256)] = 2
+    """Worker processes to start on this machine."""
+    max_upload_mb: Annotated[int, Field(ge=1)] = 4096
+    """Largest dataset that may be uploaded, megabytes, packed and unpacked."""
+    public_url: str = ""
+    """Address under which browsers reach the app, where a reverse proxy stands in front."""
+
+    @property
+    def resolved_database_url(self) -> str:
+        """`database_url`, or SQLite in the state directory."""
+        return self.database_url or f"sqlite:///{self.state_dir.resolve() / 'snap6d.sqlite'}"
+
+    @property
+    def files_dir(self) -> Path:
+        """Where the file store keeps its content."""
+        return self.state_dir / "files"
+
+    @property
+    def cache_dir(self) -> Path:
+        """Where workers on this machine keep what they built of an object."""
+        return self.state_dir / "cache"

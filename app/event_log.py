@@ -1,0 +1,101 @@
+"""The append-only log of what operators and the machine did: on the disk when `append` returns."""
+
+import time
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import func, select
+
+from app.auth import Actor
+from app.database import Database
+from app.tables import EstimateRow, Event, Pose, Registration, utc_now
+
+BOOT_ID = uuid.uuid4().hex
+"""Names this run of the server: monotonic seconds are comparable only within one run."""
+
+
+@dataclass(frozen=True)
+class NewEvent:
+    """One thing that happened, before it is written down."""
+
+    kind: str
+    actor: Actor
+    T_before: Pose | None = None
+    T_after: Pose | None = None
+    dof: Sequence[str] | None = None
+    """Degrees of freedom that a drag changed, in the gizmo's frame: tx, ty, tz, rx, ry, rz."""
+    path: Sequence[Sequence[float]] | None = None
+    """A drag's way: rows of seconds since its start, x, y, z [m], and the rotation as wxyz."""
+    duration_seconds: float | None = None
+    snap_id: str | None = None
+    detail: dict[str, Any] = field(default_factory=dict)
+
+
+class EventLog:
+    """Writes and reads the events of registrations."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def append(
+        self, registration_id: int, user_id: int, event: NewEvent, estimate: EstimateRow | None = None
+    ) -> Event:
+        """Write one event, with the estimate it brings, in one durable transaction.
+
+        A `submit` event also closes the registration with its pose.
+        """
+        with self._database.write() as session:
+            last = session.scalar(
+                select(func.max(Event.sequence)).where(Event.registration_id == registration_id)
+            )
+            row = Event(
+                registration_id=registration_id,
+                user_id=user_id,
+                sequence=(last or 0) + 1,
+                utc=utc_now(),
+                monotonic_seconds=time.monotonic(),
+                boot_id=BOOT_ID,
+                kind=event.kind,
+                actor=event.actor,
+                T_before=event.T_before,
+                T_after=event.T_after,
+                dof=None if event.dof is None else list(event.dof),
+                path=None if event.path is None else [list(row) for row in event.path],
+                duration_seconds=event.duration_seconds,
+                snap_id=event.snap_id,
+                detail=event.detail,
+            )
+            session.add(row)
+            if estimate is not None:
+                session.add(estimate)
+            if event.kind == "submit":
+                registration = session.get_one(Registration, registration_id)
+                registration.state = "submitted"
+                registration.T_world_object = event.T_after
+                registration.submitted_at = row.utc
+        return row
+
+    def events(self, registration_id: int, after: int = 0, limit: int | None = None) -> Sequence[Event]:
+        """Events of a registration in their order, from the one that follows sequence number `after`."""
+        query = (
+            select(Event)
+            .where(Event.registration_id == registration_id, Event.sequence > after)
+            .order_by(Event.sequence)
+            .limit(limit)
+        )
+        with self._database.read() as session:
+            return session.scalars(query).all()
+
+    def snap_events(self, snap_id: str) -> Sequence[Event]:
+        """The events that one snap gave rise to, in their order."""
+        with self._database.read() as session:
+            return session.scalars(
+                select(Event).where(Event.snap_id == snap_id).order_by(Event.sequence)
+            ).all()
+
+    def estimate(self, snap_id: str) -> EstimateRow | None:
+        """What a snap found, where it finished."""
+        with self._database.read() as session:
+            return session.scalar(select(EstimateRow).where(EstimateRow.snap_id == snap_id))

@@ -1,0 +1,236 @@
+"""The database's tables. Poses are 4x4 nested lists, metres; times are UTC; files are hashes in the store."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    DateTime,
+    Dialect,
+    Float,
+    ForeignKey,
+    Index,
+    String,
+    TypeDecorator,
+    UniqueConstraint,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+
+Pose = list[list[float]]
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """A moment with its time zone, also on databases that keep none."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
+        """Mark what comes back without a zone as UTC."""
+        return value.replace(tzinfo=UTC) if value is not None and value.tzinfo is None else value
+
+
+def utc_now() -> datetime:
+    """The present moment, UTC."""
+    return datetime.now(UTC)
+
+
+class Base(DeclarativeBase):
+    """Common base of all tables."""
+
+    type_annotation_map = {  # noqa: RUF012 - read by SQLAlchemy
+        dict[str, Any]: JSON(none_as_null=True),
+        list[Any]: JSON(none_as_null=True),
+        Pose: JSON(none_as_null=True),
+        datetime: UtcDateTime,
+    }
+
+
+class User(Base):
+    """A person who may sign in."""
+
+    __tablename__ = "users"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(100), unique=True)
+    role: Mapped[str] = mapped_column(String(20))
+    password_hash: Mapped[str | None] = mapped_column(String(200))
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+
+class Credential(Base):
+    """A secret that stands for a user: a login session, an API token or a one-time sign-in link."""
+
+    __tablename__ = "credentials"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    kind: Mapped[str] = mapped_column(String(20))
+    secret_hash: Mapped[str] = mapped_column(String(64), unique=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"), index=True)
+    name: Mapped[str] = mapped_column(String(100), default="")
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    expires_at: Mapped[datetime | None]
+    user: Mapped[User] = relationship(lazy="joined")
+
+
+class Dataset(Base):
+    """A named collection of objects and scenes."""
+
+    __tablename__ = "datasets"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(200), unique=True)
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+
+
+class Object(Base):
+    """A known object of a dataset."""
+
+    __tablename__ = "objects"
+    __table_args__ = (UniqueConstraint("dataset_id", "obj_id"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"))
+    obj_id: Mapped[int]
+    name: Mapped[str] = mapped_column(String(200))
+    mesh_hash: Mapped[str] = mapped_column(String(64))
+    mesh_format: Mapped[str] = mapped_column(String(10))
+    model_hash: Mapped[str] = mapped_column(String(64))
+    diameter: Mapped[float] = mapped_column(Float)
+    symmetries: Mapped[dict[str, Any]]
+
+
+class Scene(Base):
+    """One rigid world: frames whose poses in it are known."""
+
+    __tablename__ = "scenes"
+    __table_args__ = (UniqueConstraint("dataset_id", "split", "bop_scene_id", "label"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"))
+    split: Mapped[str] = mapped_column(String(50))
+    bop_scene_id: Mapped[int]
+    label: Mapped[str] = mapped_column(String(200))
+    dataset: Mapped[Dataset] = relationship()
+    frames: Mapped[list["Frame"]] = relationship(order_by="Frame.image_id", back_populates="scene")
+
+
+class Frame(Base):
+    """One RGB-D image; `depth_scale` turns its raw depth into millimetres."""
+
+    __tablename__ = "frames"
+    __table_args__ = (UniqueConstraint("scene_id", "image_id"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    scene_id: Mapped[int] = mapped_column(ForeignKey("scenes.id"))
+    image_id: Mapped[int]
+    color_hash: Mapped[str | None] = mapped_column(String(64))
+    depth_hash: Mapped[str] = mapped_column(String(64))
+    depth_scale: Mapped[float] = mapped_column(Float)
+    width: Mapped[int]
+    height: Mapped[int]
+    fx: Mapped[float] = mapped_column(Float)
+    fy: Mapped[float] = mapped_column(Float)
+    cx: Mapped[float] = mapped_column(Float)
+    cy: Mapped[float] = mapped_column(Float)
+    T_world_camera: Mapped[Pose]
+    posed: Mapped[bool]
+    scene: Mapped[Scene] = relationship(back_populates="frames")
+
+
+class Task(Base):
+    """One instance of an object in a scene, to be registered under a mode and a condition."""
+
+    __tablename__ = "tasks"
+    __table_args__ = (UniqueConstraint("scene_id", "object_id", "instance", "mode", "condition"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    scene_id: Mapped[int] = mapped_column(ForeignKey("scenes.id"))
+    object_id: Mapped[int] = mapped_column(ForeignKey("objects.id"))
+    instance: Mapped[int]
+    mode: Mapped[str] = mapped_column(String(20))
+    condition: Mapped[str] = mapped_column(String(20))
+    frame_id: Mapped[int] = mapped_column(ForeignKey("frames.id"))
+    T_world_object_start: Mapped[Pose]
+    T_world_object_reference: Mapped[Pose | None]
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    scene: Mapped[Scene] = relationship()
+    object: Mapped[Object] = relationship()
+    frame: Mapped[Frame] = relationship()
+    registrations: Mapped[list["Registration"]] = relationship(back_populates="task")
+
+
+class Registration(Base):
+    """One operator's work on one task: whose it is and how it ended. What happened is in its events."""
+
+    __tablename__ = "registrations"
+    __table_args__ = (UniqueConstraint("task_id", "user_id"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    task_id: Mapped[int] = mapped_column(ForeignKey("tasks.id"))
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    state: Mapped[str] = mapped_column(String(20), default="open")
+    T_world_object: Mapped[Pose | None]
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    submitted_at: Mapped[datetime | None]
+    task: Mapped[Task] = relationship(back_populates="registrations")
+    user: Mapped[User] = relationship()
+
+
+class Event(Base):
+    """One thing that an operator or the machine did. Append-only: a trigger refuses changes."""
+
+    __tablename__ = "events"
+    __table_args__ = (
+        UniqueConstraint("registration_id", "sequence"),
+        Index("ix_events_snap_id", "snap_id"),
+    )
+    id: Mapped[int] = mapped_column(primary_key=True)
+    registration_id: Mapped[int] = mapped_column(ForeignKey("registrations.id"))
+    sequence: Mapped[int]
+    kind: Mapped[str] = mapped_column(String(30))
+    actor: Mapped[str] = mapped_column(String(20))
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    utc: Mapped[datetime]
+    monotonic_seconds: Mapped[float] = mapped_column(Float)
+    boot_id: Mapped[str] = mapped_column(String(40))
+    duration_seconds: Mapped[float | None] = mapped_column(Float)
+    T_before: Mapped[Pose | None]
+    T_after: Mapped[Pose | None]
+    dof: Mapped[list[Any] | None]
+    path: Mapped[list[Any] | None]
+    snap_id: Mapped[str | None] = mapped_column(String(40))
+    detail: Mapped[dict[str, Any]] = mapped_column(default=dict)
+
+
+class EstimateRow(Base):
+    """One result of a snap with all that is needed to repeat it. Append-only: a trigger refuses changes."""
+
+    __tablename__ = "estimates"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    snap_id: Mapped[str] = mapped_column(String(40), unique=True)
+    registration_id: Mapped[int] = mapped_column(ForeignKey("registrations.id"), index=True)
+    frame_id: Mapped[int] = mapped_column(ForeignKey("frames.id"))
+    T_world_object_start: Mapped[Pose]
+    T_world_object: Mapped[Pose]
+    T_camera_object: Mapped[Pose]
+    confidence: Mapped[float] = mapped_column(Float)
+    covariance: Mapped[list[Any]]
+    hypotheses: Mapped[list[Any]]
+    converged: Mapped[bool]
+    seed: Mapped[int] = mapped_column(BigInteger)
+    config: Mapped[dict[str, Any]]
+    version: Mapped[str] = mapped_column(String(40))
+    hardware: Mapped[str] = mapped_column(String(200))
+    seconds: Mapped[float] = mapped_column(Float)
+    evaluations: Mapped[int]
+    utc: Mapped[datetime] = mapped_column(default=utc_now)
+
+
+class Export(Base):
+    """A dataset export: a job and, when done, the zip in the file store."""
+
+    __tablename__ = "exports"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"))
+    format: Mapped[str] = mapped_column(String(20))
+    state: Mapped[str] = mapped_column(String(20), default="queued")
+    progress: Mapped[float] = mapped_column(Float, default=0.0)
+    message: Mapped[str] = mapped_column(String(2000), default="")
+    file_hash: Mapped[str | None] = mapped_column(String(64))
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    dataset: Mapped[Dataset] = relationship()

@@ -1,0 +1,129 @@
+"""Fixtures: a database, a file store, a small dataset, workers, and the application on top of them."""
+
+import logging
+import shutil
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+
+import dask
+import httpx
+import pytest
+from distributed import LocalCluster
+
+from app.auth import Role
+from app.config import Settings
+from app.database import Database
+from app.importing import import_dataset
+from app.main import create_services
+from app.services import Services
+from app.storage import FileStore
+from tests.app.live import LiveServer, running_server
+from tests.app.small_dataset import NAME, write_small_dataset
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    """An empty database with its tables."""
+    opened = Database(f"sqlite:///{tmp_path / 'snap6d.sqlite'}")
+    opened.migrate()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> FileStore:
+    """An empty file store."""
+    return FileStore(tmp_path / "files")
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small dataset; to be read, not to be changed."""
+    return write_small_dataset(tmp_path_factory.mktemp("small") / NAME)
+
+
+@pytest.fixture
+def demo_copy(demo: Path, tmp_path: Path) -> Path:
+    """The small dataset; to be changed."""
+    return Path(shutil.copytree(demo, tmp_path / NAME))
+
+
+@pytest.fixture(scope="session")
+def cluster() -> Iterator[str]:
+    """Address of a scheduler with two workers."""
+    dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address="127.0.0.1:0",
+        memory_limit=0,
+        preload=["app.worker"],
+        silence_logs=logging.ERROR,
+    ) as started:
+        yield started.scheduler_address
+
+
+@pytest.fixture(scope="session")
+def imported_state(demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A state directory into which the small dataset was imported; to be copied."""
+    settings = Settings(state_dir=tmp_path_factory.mktemp("imported") / "state")
+    settings.state_dir.mkdir()
+    database = Database(settings.resolved_database_url)
+    database.migrate()
+    import_dataset(database, FileStore(settings.files_dir), demo)
+    database.close()
+    return settings.state_dir
+
+
+@pytest.fixture
+def state_dir(imported_state: Path, tmp_path: Path) -> Path:
+    """A state directory with the small dataset."""
+    return Path(shutil.copytree(imported_state, tmp_path / "state"))
+
+
+def settings_for(state_dir: Path, cluster: str) -> Settings:
+    """What the application is started with."""
+    return Settings(state_dir=state_dir, scheduler_address=cluster, max_upload_mb=8)
+
+
+@pytest.fixture
+def services(state_dir: Path, cluster: str) -> Iterator[Services]:
+    """The parts of an application, without their port."""
+    opened = create_services(settings_for(state_dir, cluster))
+    yield opened
+    opened.desk.close()
+    opened.export_jobs.close()
+    opened.snapper.close()
+    opened.database.close()
+
+
+@pytest.fixture
+def own_live(state_dir: Path, cluster: str) -> Iterator[LiveServer]:
+    """The application behind a real port, for a test that changes what all users see."""
+    with running_server(create_services(settings_for(state_dir, cluster))) as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def live(
+    imported_state: Path, cluster: str, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[LiveServer]:
+    """The application behind a real port, for tests whose users keep to their own registrations."""
+    state_dir = Path(shutil.copytree(imported_state, tmp_path_factory.mktemp("live") / "state"))
+    with running_server(create_services(settings_for(state_dir, cluster))) as server:
+        yield server
+
+
+@pytest.fixture
+def script(live: LiveServer) -> httpx.Client:
+    """A script of a new operator."""
+    return live.script(f"robot {uuid.uuid4().hex}")
+
+
+@pytest.fixture
+def admin(live: LiveServer) -> httpx.Client:
+    """A script of a new administrator."""
+    return live.script(f"root {uuid.uuid4().hex}", Role.ADMIN)

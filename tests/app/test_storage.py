@@ -1,0 +1,70 @@
+"""The content-addressed file store."""
+
+import hashlib
+import threading
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from app.storage import FileStore
+
+
+def stored(files: FileStore) -> list[Path]:
+    return sorted(path for path in files.root.rglob("*") if path.is_file())
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
+@given(st.binary(max_size=300))
+def test_what_was_put_in_comes_out_under_its_hash(files, content):
+    digest = files.put_bytes(content)
+    assert digest == hashlib.sha256(content).hexdigest()
+    assert files.read(digest) == content == files.path(digest).read_bytes()
+
+
+def test_equal_content_is_kept_once(files, tmp_path):
+    (tmp_path / "a.bin").write_bytes(b"same")
+    assert files.put_bytes(b"same") == files.put_file(tmp_path / "a.bin")
+    assert len(stored(files)) == 1
+    assert (tmp_path / "a.bin").exists()
+
+
+def test_an_adopted_file_is_moved(files, tmp_path):
+    source = tmp_path / "large.zip"
+    source.write_bytes(b"large")
+    digest = files.adopt(source)
+    assert digest == hashlib.sha256(b"large").hexdigest()
+    assert not source.exists() and files.read(digest) == b"large"
+    source.write_bytes(b"large")
+    assert files.adopt(source) == digest
+    assert len(stored(files)) == 1 and not source.exists()
+
+
+@pytest.mark.parametrize("name", ["", "../../etc/passwd", "a" * 63, "A" * 64, "g" * 64, "a" * 64 + "\n"])
+def test_only_hashes_name_files(files, name):
+    with pytest.raises(AssertionError):
+        files.path(name)
+
+
+def test_a_write_that_fails_leaves_nothing(files, monkeypatch):
+    def no_space(handle: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("app.storage.os.fsync", no_space)
+    with pytest.raises(OSError, match="No space left"):
+        files.put_bytes(b"content")
+    assert stored(files) == []
+    monkeypatch.undo()
+    assert files.read(files.put_bytes(b"content")) == b"content"
+
+
+def test_many_at_once_put_the_same_content(files):
+    content = b"x" * 100_000
+    threads = [threading.Thread(target=files.put_bytes, args=(content,)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    (path,) = stored(files)
+    assert path.read_bytes() == content
