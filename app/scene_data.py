@@ -1,0 +1,105 @@
+"""Pictures, depth, point clouds and object models out of the file store, the recent ones kept in memory."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.storage import FileStore
+from app.tables import Frame, Object
+from registration_core import Intrinsics, ObjectModel, Symmetries, pose
+from registration_core.bop import read_color, read_depth
+from registration_core.camera import depth_to_points
+from registration_core.object_model import ContinuousSymmetry
+
+CLOUD_POINTS = 300_000
+"""Most points of a cloud that is shown."""
+PLAIN_COLOR = (160, 165, 172)
+"""Of points in a frame without a colour image."""
+KEPT_MODELS = 32
+KEPT_FRAMES = 16
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Coloured points in the world's frame."""
+
+    points: NDArray[np.float32]
+    """(N, 3), metres."""
+    colors: NDArray[np.uint8]
+    """(N, 3)."""
+
+
+class SceneData:
+    """Arrays behind the rows of frames and objects."""
+
+    def __init__(self, files: FileStore) -> None:
+        self._files = files
+        self._model = lru_cache(KEPT_MODELS)(self._load_model)
+        self._depth = lru_cache(KEPT_FRAMES)(self._load_depth)
+
+    def model(self, item: Object) -> ObjectModel:
+        """The object's mesh, in metres."""
+        return self._model(item.mesh_hash, item.mesh_format, symmetries_from_json(item.symmetries))
+
+    def depth(self, frame: Frame) -> NDArray[np.float32]:
+        """The frame's depth image (H, W), metres, 0 where there is none; not to be written to."""
+        return self._depth(frame.depth_hash, frame.depth_scale)
+
+    def color(self, frame: Frame) -> NDArray[np.uint8] | None:
+        """The frame's colour image (H, W, 3), where it has one."""
+        return read_color(self._files.path(frame.color_hash)) if frame.color_hash else None
+
+    def cloud(self, frame: Frame) -> PointCloud:
+        """The frame's measured points in the world, thinned out evenly where there are too many."""
+        depth, color = self.depth(frame), self.color(frame)
+        measured = np.flatnonzero(depth)
+        if len(measured) > CLOUD_POINTS:
+            measured = measured[np.linspace(0, len(measured) - 1, CLOUD_POINTS).astype(np.intp)]
+        points = depth_to_points(depth, camera_of(frame)).reshape(-1, 3)[measured]
+        world = pose.apply(np.array(frame.T_world_camera), points).astype(np.float32)
+        colors = (
+            np.full((len(measured), 3), PLAIN_COLOR, dtype=np.uint8)
+            if color is None
+            else color.reshape(-1, 3)[measured]
+        )
+        return PointCloud(world, colors)
+
+    def _load_model(self, digest: str, file_format: str, symmetries: Symmetries) -> ObjectModel:
+        return ObjectModel.from_bytes(self._files.read(digest), file_format, "mm", symmetries)
+
+    def _load_depth(self, digest: str, depth_scale: float) -> NDArray[np.float32]:
+        depth = read_depth(self._files.path(digest), depth_scale)
+        depth.setflags(write=False)
+        return depth
+
+
+def camera_of(frame: Frame) -> Intrinsics:
+    """The frame's pinhole camera."""
+    return Intrinsics(frame.width, frame.height, frame.fx, frame.fy, frame.cx, frame.cy)
+
+
+def symmetries_to_json(symmetries: Symmetries) -> dict[str, object]:
+    """Symmetries as they are kept in the database: metres, in the mesh's frame."""
+    return {
+        "discrete": [[list(row) for row in T] for T in symmetries.discrete],
+        "continuous": [{"axis": list(s.axis), "offset": list(s.offset)} for s in symmetries.continuous],
+    }
+
+
+def symmetries_from_json(content: dict[str, list[object]]) -> Symmetries:
+    """The inverse of `symmetries_to_json`."""
+    discrete: list[list[list[float]]] = content.get("discrete", [])  # type: ignore[assignment]
+    continuous: list[dict[str, list[float]]] = content.get("continuous", [])  # type: ignore[assignment]
+    return Symmetries(
+        discrete=tuple(tuple(tuple(row) for row in T) for T in discrete),
+        continuous=tuple(
+            ContinuousSymmetry(_triple(entry["axis"]), _triple(entry["offset"])) for entry in continuous
+        ),
+    )
+
+
+def _triple(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = values
+    return x, y, z
