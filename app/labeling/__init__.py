@@ -1,0 +1,1 @@
+"""One operator's work on one object: its state, its 3-D view, and the door to that view."""

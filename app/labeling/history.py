@@ -1,0 +1,86 @@
+"""The poses a registration went through, with undo and redo: a pure function of its events."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.tables import Pose
+
+NEW_POSE_KINDS = frozenset({"drag", "set_pose", "snap_applied", "accept", "reset"})
+"""Events that put a new pose on top, and with it end what could be redone."""
+
+
+class LoggedEvent(Protocol):
+    """What replaying needs of an event."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def T_after(self) -> Pose | None: ...
+    @property
+    def detail(self) -> dict[str, object]: ...
+
+
+@dataclass(frozen=True)
+class Step:
+    """A pose in the history."""
+
+    T_world_object: NDArray[np.float64]
+    """(4, 4)."""
+    confidence: float | None = None
+    """Of the estimate that the pose stems from; None where a person set it."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Steps from the start pose on, and which of them is the present one."""
+
+    steps: tuple[Step, ...]
+    position: int = 0
+
+    @property
+    def current(self) -> Step:
+        """The present pose."""
+        return self.steps[self.position]
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether there is a pose before."""
+        return self.position > 0
+
+    @property
+    def can_redo(self) -> bool:
+        """Whether a pose was undone."""
+        return self.position < len(self.steps) - 1
+
+    def pushed(self, step: Step) -> "History":
+        """With a new present pose; what was undone is gone."""
+        return History((*self.steps[: self.position + 1], step), self.position + 1)
+
+    def undone(self) -> "History":
+        """One pose back."""
+        assert self.can_undo
+        return History(self.steps, self.position - 1)
+
+    def redone(self) -> "History":
+        """One pose forward again."""
+        assert self.can_redo
+        return History(self.steps, self.position + 1)
+
+
+def replay(T_start: NDArray[np.float64], events: Iterable[LoggedEvent]) -> History:
+    """The history that the events of a registration amount to, in their order."""
+    history = History((Step(T_start),))
+    for event in events:
+        if event.kind == "undo":
+            history = history.undone()
+        elif event.kind == "redo":
+            history = history.redone()
+        elif event.kind in NEW_POSE_KINDS:
+            confidence = event.detail.get("confidence")
+            T = np.array(event.T_after, dtype=np.float64)
+            history = history.pushed(Step(T, None if confidence is None else float(str(confidence))))
+    return history

@@ -1,0 +1,99 @@
+"""The same-origin door to the views: HTTP and WebSocket, for the session's owner only."""
+
+import asyncio
+import contextlib
+from typing import Annotated
+from urllib.parse import quote
+
+import httpx
+import websockets
+from fastapi import APIRouter, Depends, Request, Response, WebSocket
+from starlette.websockets import WebSocketDisconnect
+
+from app.api.dependencies import Id, get_services, identify, is_same_origin
+from app.api.registrations import SeatDep
+from app.labeling.desk import NotFoundError, Seat
+from app.services import Services
+
+router = APIRouter(include_in_schema=False)
+
+SUBPROTOCOL_PREFIX = "viser-v"
+REFUSED = 4403
+"""Close code of a WebSocket that may not be opened."""
+
+
+@router.get("/view/{registration_id}/{path:path}")
+async def view_page(
+    path: str, request: Request, seat: SeatDep, services: Annotated[Services, Depends(get_services)]
+) -> Response:
+    """A file of the view's page."""
+    port = await asyncio.to_thread(services.desk.view_port, seat)
+    client: httpx.AsyncClient = request.app.state.http
+    answer = await client.get(f"http://127.0.0.1:{port}/{quote(path)}")
+    return Response(
+        answer.content,
+        answer.status_code,
+        media_type=answer.headers.get("content-type"),
+        headers={"cache-control": "private, max-age=600"},
+    )
+
+
+@router.websocket("/view/{registration_id}/")
+@router.websocket("/view/{registration_id}")
+async def view_socket(socket: WebSocket, registration_id: Id) -> None:
+    """The view's messages, both ways, unread."""
+    services = get_services(socket)
+    seat = await asyncio.to_thread(_allowed_seat, socket, registration_id)
+    if seat is None:
+        await socket.close(REFUSED)
+        return
+    port = await asyncio.to_thread(services.desk.view_port, seat)
+    leave = services.desk.watch(seat)
+    try:
+        await _join(socket, port)
+    finally:
+        leave()
+
+
+def _allowed_seat(socket: WebSocket, registration_id: int) -> Seat | None:
+    if not is_same_origin(socket, required=True):
+        return None
+    identity = identify(socket)
+    if identity is None:
+        return None
+    try:
+        return get_services(socket).desk.seat(registration_id, identity)
+    except NotFoundError:
+        return None
+
+
+async def _join(socket: WebSocket, port: int) -> None:
+    protocols = [
+        websockets.Subprotocol(name)
+        for name in socket.scope["subprotocols"]
+        if name.startswith(SUBPROTOCOL_PREFIX)
+    ]
+    async with websockets.connect(
+        f"ws://127.0.0.1:{port}/", subprotocols=protocols, max_size=None, compression=None
+    ) as view:
+        await socket.accept(subprotocol=view.subprotocol)
+        tasks = {asyncio.create_task(_to_page(socket, view)), asyncio.create_task(_to_view(socket, view))}
+        _, unfinished = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in unfinished:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the page may have closed first
+            await socket.close()
+
+
+async def _to_page(socket: WebSocket, view: websockets.ClientConnection) -> None:
+    # A message gets no name here: the last one, often a whole scene, would be kept until the next one comes.
+    with contextlib.suppress(websockets.ConnectionClosed):
+        while True:
+            await socket.send_bytes(await view.recv(decode=False))
+
+
+async def _to_view(socket: WebSocket, view: websockets.ClientConnection) -> None:
+    with contextlib.suppress(WebSocketDisconnect):
+        while True:
+            await view.send(await socket.receive_bytes())

@@ -1,0 +1,103 @@
+"""What a session and the machine tell each other about a snap."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.tables import EstimateRow
+from registration_core import Estimate, SnapConfig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SnapOrder:
+    """What a snap is to work on."""
+
+    snap_id: str
+    frame_id: int
+    T_world_object: Array
+    config: SnapConfig
+    seed: int
+
+
+@dataclass(frozen=True)
+class SnapResult:
+    """What a worker found."""
+
+    estimate: Estimate
+    T_world_object: Array
+    version: str
+    hardware: str
+
+
+class SnapFailure(Exception):  # noqa: N818 - an outcome that is handed over, not raised
+    """Why a snap came to nothing; the message may be shown."""
+
+
+class RequestSnap(Protocol):
+    """Hands an order to the workers and returns a function that cancels it.
+
+    `on_progress` gets shares in [0, 1]; `on_end` is called once, from any thread, unless cancelled before.
+    """
+
+    def __call__(
+        self,
+        order: SnapOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SnapResult | SnapFailure], None],
+    ) -> Callable[[], None]: ...
+
+
+@dataclass(frozen=True)
+class SnapStatus:
+    """How the last snap stands."""
+
+    id: str
+    state: str = "queued"
+    """queued, running, done, cancelled or failed."""
+    progress: float = 0.0
+    message: str | None = None
+
+    @property
+    def is_live(self) -> bool:
+        """Whether it may still bring a result."""
+        return self.state in {"queued", "running"}
+
+
+@dataclass(frozen=True)
+class Offer:
+    """An estimate that waits for the operator's word, since the object was moved meanwhile."""
+
+    snap_id: str
+    T_world_object: Array
+    confidence: float
+
+
+def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> EstimateRow:
+    """A result as it is kept, with all that is needed to repeat it."""
+    estimate = result.estimate
+    return EstimateRow(
+        snap_id=order.snap_id,
+        registration_id=registration_id,
+        frame_id=order.frame_id,
+        T_world_object_start=order.T_world_object.tolist(),
+        T_world_object=result.T_world_object.tolist(),
+        T_camera_object=estimate.T_camera_object.tolist(),
+        confidence=estimate.confidence,
+        covariance=estimate.covariance.tolist(),
+        hypotheses=[
+            {"T_camera_object": mode.T_camera_object.tolist(), "weight": mode.weight}
+            for mode in estimate.hypotheses
+        ],
+        converged=estimate.converged,
+        seed=order.seed,
+        config=order.config.to_dict(),
+        version=result.version,
+        hardware=result.hardware,
+        seconds=estimate.seconds,
+        evaluations=estimate.evaluations,
+    )

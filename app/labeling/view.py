@@ -1,0 +1,158 @@
+"""The 3-D view of one labelling session: point cloud, mesh and gizmo in viser."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from viser import _messages
+
+from registration_core import ObjectModel, pose
+
+Array = NDArray[np.float64]
+
+HUMAN_COLOR = (255, 149, 64)
+"""Of what the operator holds; the same in the pages' style sheet."""
+MESH_OPACITY = 0.55
+GIZMO_SIZE = 0.75
+"""Length of the gizmo's arms as a share of the object's diameter."""
+STEP_BACK = 1.15
+"""How much further from the object than the sensor the first view is."""
+FIELD_OF_VIEW_LIMITS = (0.5, 1.3)
+"""Radians, vertical."""
+BACKGROUND = (24, 27, 33)
+
+
+@dataclass(frozen=True)
+class DragHandlers:
+    """What happens when the operator takes, moves and lets go of the gizmo; poses are T_world_object."""
+
+    on_start: Callable[[], None]
+    on_move: Callable[[Array], None]
+    on_end: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class FirstView:
+    """Where the camera stands when a page opens."""
+
+    T_world_camera: Array
+    """The sensor's pose (4, 4)."""
+    field_of_view: float
+    """The sensor's, vertical, radians."""
+    distance: float
+    """From the sensor to what there is to see, metres."""
+
+
+class SceneView:
+    """One viser server on the loopback, for one session; what it shows survives a reload of the page."""
+
+    def __init__(
+        self, model: ObjectModel, T_world_object: Array, first_view: FirstView, drag: DragHandlers
+    ) -> None:
+        self._T_object_gizmo = pose.from_rotation_translation(np.eye(3), model.centre)
+        self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        _refuse_sharing(self._server)
+        self._server.gui.configure_theme(
+            show_logo=False, show_share_button=False, dark_mode=True, control_layout="floating"
+        )
+        self._server.scene.set_background_image(np.full((1, 1, 3), BACKGROUND, dtype=np.uint8))
+        self._place_camera(first_view)
+        self._gizmo = self._add_object(model, T_world_object)
+        self._follow_drags(drag)
+
+    @property
+    def port(self) -> int:
+        """The loopback port that the view is served on."""
+        return self._server.get_port()
+
+    def show_cloud(self, points: NDArray[np.float32], colors: NDArray[np.uint8], point_size: float) -> None:
+        """Show a point cloud (N, 3) in the world, metres, in place of the one before."""
+        self._server.scene.add_point_cloud(
+            "/cloud", points, colors, point_size=point_size, point_shape="circle", precision="float32"
+        )
+
+    def move_object(self, T_world_object: Array) -> None:
+        """Put object and gizmo at a pose. Not while a drag goes on: the page would overwrite it."""
+        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+        with self._server.atomic():
+            self._gizmo.position = position
+            self._gizmo.wxyz = wxyz
+
+    def lock_object(self) -> None:
+        """Take the gizmo's handles away; the object stays in view."""
+        with self._server.atomic():
+            self._gizmo.disable_axes = True
+            self._gizmo.disable_sliders = True
+            self._gizmo.disable_rotations = True
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._server.stop()
+
+    def _place_camera(self, view: FirstView) -> None:
+        look_at = pose.apply(view.T_world_camera, [0.0, 0.0, view.distance])
+        position = pose.apply(view.T_world_camera, [0.0, 0.0, view.distance * (1.0 - STEP_BACK)])
+        up = -view.T_world_camera[:3, 1]
+        self._server.scene.set_up_direction(up)
+        camera = self._server.initial_camera
+        camera.position = position
+        camera.look_at = look_at
+        camera.up = up
+        camera.fov = float(np.clip(view.field_of_view, *FIELD_OF_VIEW_LIMITS))
+
+    def _add_object(self, model: ObjectModel, T_world_object: Array) -> viser.TransformControlsHandle:
+        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+        gizmo = self._server.scene.add_transform_controls(
+            "/object",
+            scale=GIZMO_SIZE * model.diameter,
+            line_width=3.0,
+            depth_test=False,
+            position=position,
+            wxyz=wxyz,
+        )
+        self._server.scene.add_mesh_simple(
+            "/object/mesh",
+            vertices=(model.vertices - model.centre).astype(np.float32),
+            faces=model.faces,
+            color=HUMAN_COLOR,
+            opacity=MESH_OPACITY,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        return gizmo
+
+    def _follow_drags(self, drag: DragHandlers) -> None:
+        @self._gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            # Called in order on the view's own event loop. A drag's end blocks it until the drag is on the
+            # disk, so that the next drag cannot begin before.
+            if event.phase == "start":
+                drag.on_start()
+                return
+            gizmo = event.target
+            T_world_gizmo = _from_viser(gizmo.position, gizmo.wxyz)
+            drag.on_move(T_world_gizmo @ pose.inverse(self._T_object_gizmo))
+            if event.phase == "end":
+                drag.on_end()
+                await asyncio.sleep(0)
+
+
+def _refuse_sharing(server: viser.ViserServer) -> None:
+    # Any client may ask viser for a public tunnel to this server; hiding the button would not stop that.
+    websocket = server._websock_server
+    websocket.unregister_handler(_messages.ShareUrlRequest)
+    websocket.unregister_handler(_messages.ShareUrlDisconnect)
+
+
+def _to_viser(T: Array) -> tuple[Array, Array]:
+    return T[:3, 3], Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
+
+
+def _from_viser(position: Array, wxyz: Array) -> Array:
+    rotation = Rotation.from_quat(wxyz, scalar_first=True)
+    return pose.from_rotation_translation(rotation.as_matrix(), position)

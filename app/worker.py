@@ -1,0 +1,112 @@
+"""What runs inside a worker process.
+
+A worker needs no shared files: a job brings the depth it looks at, and an object comes once and is kept.
+"""
+
+import platform
+import time
+from collections import OrderedDict, deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from distributed import get_worker
+from numpy.typing import NDArray
+
+from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap_steps
+from registration_core.snap import warm_up
+from registration_core.viewpoint_model import viewpoint_model
+
+KEPT_MODELS = 64
+SECONDS_BETWEEN_REPORTS = 0.05
+
+_models: OrderedDict[str, ObjectModel] = OrderedDict()
+_cancelled: deque[str] = deque(maxlen=1000)
+
+
+class SnapCancelledError(Exception):
+    """The job was cancelled while it ran."""
+
+
+@dataclass(frozen=True)
+class SnapJob:
+    """All that a worker needs for one snap, but for the object."""
+
+    snap_id: str
+    topic: str
+    """Where progress is told."""
+    model_hash: str
+    depth: NDArray[np.float32]
+    """(H, W), metres: the part of the image that the snap may look at."""
+    camera: Intrinsics
+    """Of that part."""
+    T_camera_object: NDArray[np.float64]
+    config: SnapConfig
+    seed: int
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """An estimate, and what it was made with."""
+
+    estimate: Estimate
+    hardware: str
+
+
+def run_snap(job: SnapJob, model: ObjectModel | None) -> JobResult | None:
+    """Run one snap, telling how far it is and stopping when it is cancelled.
+
+    Returns:
+        None where the object was not sent and is not known here: the job has to come again with it.
+
+    Raises:
+        SnapCancelledError: where `cancel` was called meanwhile.
+        ValueError: where the job is bad, as `registration_core.snap` says.
+    """
+    if model is not None:
+        _keep(model)
+    elif job.model_hash not in _models:
+        return None
+    known = _models[job.model_hash]
+    _models.move_to_end(job.model_hash)
+    reported = 0.0
+    estimate = None
+    rng = np.random.default_rng(job.seed)
+    for step in snap_steps(known, job.depth, job.camera, job.T_camera_object, config=job.config, rng=rng):
+        if job.snap_id in _cancelled:
+            raise SnapCancelledError(job.snap_id)
+        if time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
+            reported = time.monotonic()
+            share = step.iteration / max(1, step.iterations)
+            get_worker().log_event(job.topic, {"snap_id": job.snap_id, "progress": share})
+        estimate = step.estimate
+    assert estimate is not None
+    return JobResult(estimate, _hardware())
+
+
+def prepare(model: ObjectModel, cache_dir: Path | None) -> None:
+    """Build what a snap needs of an object before the first snap asks for it."""
+    _keep(model)
+    viewpoint_model(model, cache_dir)
+
+
+def cancel(snap_id: str) -> None:
+    """Stop a snap at its next step, if it runs here or comes here later."""
+    _cancelled.append(snap_id)
+
+
+def dask_setup(_worker: Any) -> None:
+    """Dask preload: load every compiled kernel before the first job comes."""
+    warm_up()
+
+
+def _keep(model: ObjectModel) -> None:
+    _models[model.content_hash] = model
+    _models.move_to_end(model.content_hash)
+    while len(_models) > KEPT_MODELS:
+        _models.popitem(last=False)
+
+
+def _hardware() -> str:
+    return f"{platform.machine()} {platform.processor() or 'cpu'} on {platform.node()}"

@@ -1,0 +1,184 @@
+"""The view over the wire: what a page receives, and what the operator's drags become."""
+
+import socket
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from app.labeling.view import DragHandlers, FirstView, SceneView
+from registration_core import ObjectModel, pose
+from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
+from tests.app.labeling.viser_client import ViserClient
+from tests.app.waiting import wait_until
+
+T_WORLD_OBJECT = pose.exp([0.1, -0.2, 0.3, 0.2, 0.4, -0.3])
+FIRST_VIEW = FirstView(T_world_camera=NEAR_VIEW, field_of_view=0.8, distance=0.5)
+COLORS = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255]], dtype=np.uint8)
+POINTS = np.array([[0.1, 0.2, 0.3], [1.00001, 2.0, 3.0], [-1.0, -2.0, -3.0]], dtype=np.float32)
+
+
+@dataclass
+class Hand:
+    """What the view told of the operator's hand, in order."""
+
+    calls: list[str] = field(default_factory=list)
+    poses: list[np.ndarray] = field(default_factory=list)
+    broken: bool = False
+
+    def start(self) -> None:
+        self.calls.append("start")
+
+    def move(self, T_world_object: np.ndarray) -> None:
+        self.calls.append("move")
+        self.poses.append(T_world_object)
+
+    def end(self) -> None:
+        self.calls.append("end")
+        if self.broken:
+            raise OSError("no space left")
+
+    def wait_for_ends(self, count: int) -> None:
+        wait_until(lambda: self.calls.count("end") >= count, f"{count} drags to end")
+
+
+@pytest.fixture
+def hand() -> Hand:
+    return Hand()
+
+
+@pytest.fixture
+def model() -> ObjectModel:
+    model = model_of(mesh_of(TOOL))
+    assert np.linalg.norm(model.centre) > 0.01  # so that the gizmo stands off the object's origin
+    return model
+
+
+@pytest.fixture
+def view(hand: Hand, model: ObjectModel) -> Iterator[SceneView]:
+    opened = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end))
+    yield opened
+    opened.close()
+
+
+def connect(view: SceneView) -> ViserClient:
+    return ViserClient(f"ws://127.0.0.1:{view.port}/")
+
+
+def gizmo_at(T_world_object: np.ndarray, model: ObjectModel) -> np.ndarray:
+    return T_world_object @ pose.from_rotation_translation(np.eye(3), model.centre)
+
+
+def test_the_mesh_stands_at_the_gizmo(view, model):
+    with connect(view) as client:
+        gizmo = client.node("TransformControlsMessage", "/object")
+        assert gizmo["props"]["scale"] == pytest.approx(0.75 * model.diameter)
+        assert gizmo["props"]["depth_test"] is False
+        mesh = client.node("MeshMessage", "/object/mesh")["props"]
+        vertices = mesh["vertices"].reshape(-1, 3)
+        assert vertices == pytest.approx((model.vertices - model.centre).astype(np.float32))
+        assert mesh["faces"].reshape(-1, 3).tolist() == model.faces.tolist()
+        assert 0 < mesh["opacity"] < 1
+        position = client.wait_for("SetPositionMessage", lambda m: m["name"] == "/object")["position"]
+        assert position == pytest.approx(pose.apply(T_WORLD_OBJECT, model.centre), abs=1e-6)
+
+
+def test_the_cloud_arrives_in_full_precision_and_is_replaced(view):
+    view.show_cloud(POINTS, COLORS, point_size=0.002)
+    with connect(view) as client:
+        cloud = client.node("PointCloudMessage", "/cloud")["props"]
+        assert cloud["points"].dtype == np.float32
+        assert np.array_equal(cloud["points"].reshape(-1, 3), POINTS)
+        assert np.array_equal(cloud["colors"].reshape(-1, 3), COLORS)
+        assert cloud["point_size"] == pytest.approx(0.002)
+        view.show_cloud(POINTS[:1], COLORS[:1], point_size=0.001)
+        client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
+
+
+def test_a_reloaded_page_sees_where_the_object_is_now(view, model):
+    moved = T_WORLD_OBJECT @ pose.exp([0.05, 0, 0, 0, 0, 0.3])
+    view.move_object(moved)
+    for _ in range(2):
+        with connect(view) as client:
+            place = client.wait_for("SetPositionMessage", lambda m: m["name"] == "/object")
+            assert place["position"] == pytest.approx(pose.apply(moved, model.centre), abs=1e-6)
+
+
+def test_the_first_view_is_the_sensors_from_a_little_further_back(view):
+    with connect(view) as client:
+        look_at = np.array(client.wait_for("SetCameraLookAtMessage")["look_at"])
+        position = np.array(client.wait_for("SetCameraPositionMessage")["position"])
+    seen = pose.apply(NEAR_VIEW, [0.0, 0.0, 0.5])
+    assert look_at == pytest.approx(seen, abs=1e-6)
+    direction = (look_at - position) / np.linalg.norm(look_at - position)
+    assert direction == pytest.approx(NEAR_VIEW[:3, 2], abs=1e-6)
+    assert 0.5 < np.linalg.norm(look_at - position) < 0.7
+
+
+def test_a_drag_over_the_wire_tells_start_moves_and_end_in_order(view, hand, model):
+    way = [T_WORLD_OBJECT @ pose.exp([0.01 * i, 0, 0, 0, 0, 0.1 * i]) for i in range(1, 6)]
+    with connect(view) as client:
+        client.drag(gizmo_at(T, model) for T in way)
+        hand.wait_for_ends(1)
+    assert hand.calls == ["start"] + ["move"] * 6 + ["end"]
+    for told, T in zip(hand.poses, [*way, way[-1]], strict=True):
+        assert told == pytest.approx(T, abs=1e-9)
+
+
+def test_many_quick_drags_stay_apart(view, hand, model):
+    with connect(view) as client:
+        for i in range(20):
+            client.drag([gizmo_at(T_WORLD_OBJECT @ pose.exp([0.001 * i, 0, 0, 0, 0, 0]), model)])
+        hand.wait_for_ends(20)
+    assert hand.calls == ["start", "move", "move", "end"] * 20
+
+
+def test_a_connection_lost_in_mid_drag_ends_the_drag(view, hand, model):
+    with connect(view) as client:
+        client.take()
+        client.move(gizmo_at(T_WORLD_OBJECT, model))
+        wait_until(lambda: "move" in hand.calls, "the drag to begin")
+    hand.wait_for_ends(1)
+
+
+def test_a_drag_that_cannot_be_saved_does_not_break_the_view(view, hand, model):
+    hand.broken = True
+    with connect(view) as client:
+        for _ in range(2):
+            client.drag([gizmo_at(T_WORLD_OBJECT, model)])
+        hand.wait_for_ends(2)
+
+
+def test_a_locked_object_has_no_handles_left(view):
+    with connect(view) as client:
+        client.node("TransformControlsMessage", "/object")
+        view.lock_object()
+        locked: dict[str, bool] = {}
+        while len(locked) < 3:
+            updates = client.wait_for(
+                "SceneNodeUpdateMessage",
+                lambda m: m["name"] == "/object" and not set(m["updates"]) <= set(locked),
+            )["updates"]
+            locked |= updates
+    assert locked == {"disable_axes": True, "disable_sliders": True, "disable_rotations": True}
+
+
+def test_a_request_for_a_public_tunnel_is_refused(view, hand, model):
+    with connect(view) as client:
+        client.send("ShareUrlRequest")
+        client.send("ShareUrlDisconnect")
+        client.drag([gizmo_at(T_WORLD_OBJECT, model)])
+        hand.wait_for_ends(1)
+        view.show_cloud(POINTS, COLORS, point_size=0.002)
+        client.node("PointCloudMessage", "/cloud")  # whatever was answered came before this
+        assert not [m for m in client.messages if m["type"] == "ShareUrlUpdated"]
+    assert view._server._share_tunnel is None
+
+
+def test_a_closed_view_serves_nobody(hand, model):
+    view = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end))
+    port = view.port
+    view.close()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port))

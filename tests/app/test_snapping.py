@@ -1,0 +1,204 @@
+"""Snaps in worker processes that the snapper starts itself."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import dask
+import numpy as np
+import pytest
+
+from app.snapping import DIED, UNREACHABLE, SnapError, Snapper
+from app.worker import JobResult, SnapJob
+from registration_core import ObjectModel, SnapConfig, region_of_interest
+from tests.app.rest import SLOW_SNAP
+from tests.app.snap_jobs import (
+    DEPTH,
+    START,
+    T_CAMERA_TOOL,
+    Outcome,
+    assert_same,
+    done_here,
+    new_job,
+    new_model,
+)
+from tests.app.export.site import CAMERA
+from tests.app.waiting import LONGEST, wait_until
+
+SLOW = SnapConfig.from_dict(SLOW_SNAP)
+
+
+@pytest.fixture(scope="module")
+def snapper(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Snapper]:
+    started = Snapper("", 2, tmp_path_factory.mktemp("cache"))
+    started.wait_until_ready()
+    yield started
+    workers = pids(started)
+    started.close()
+    assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+
+
+@pytest.fixture(scope="module")
+def model(snapper: Snapper) -> ObjectModel:
+    prepared = new_model()
+    snapper.prepare(prepared)
+    wait_until(lambda: knowing(snapper, prepared.content_hash) == 2, "the workers to be prepared")
+    return prepared
+
+
+@pytest.fixture(autouse=True)
+def idle_workers(snapper: Snapper) -> Iterator[None]:
+    """Each test finds the workers idle and leaves them so."""
+    wait_until(lambda: busy(snapper) == 0, "the workers to be idle")
+    yield
+    with snapper._lock:
+        left = list(snapper._pending)
+    for snap_id in left:
+        snapper._cancel(snap_id)
+
+
+def pids(snapper: Snapper) -> set[int]:
+    return set(snapper._client.result().run(os.getpid).values())
+
+
+def executing(snapper: Snapper) -> dict[str, int]:
+    """How many tasks each worker is at."""
+    return snapper._client.result().run(lambda dask_worker: len(dask_worker.state.executing))
+
+
+def busy(snapper: Snapper) -> int:
+    """How many workers are at something."""
+    return sum(executing(snapper).values())
+
+
+def knowing(snapper: Snapper, digest: str) -> int:
+    """How many workers know an object."""
+
+    def knows() -> bool:
+        from app import worker
+
+        return digest in worker._models
+
+    return sum(snapper._client.result().run(knows).values())
+
+
+def request(snapper: Snapper, job: SnapJob, model: ObjectModel) -> tuple[Outcome, Callable[[], None]]:
+    outcome = Outcome()
+    return outcome, snapper.request(job, model, outcome.on_progress, outcome.on_end)
+
+
+def result_of(outcome: Outcome) -> JobResult | SnapError:
+    assert outcome.ended.wait(LONGEST)
+    (end,) = outcome.ends
+    return end
+
+
+def test_it_finds_what_the_library_finds_on_the_whole_image(snapper, model):
+    margin = 200
+    image = np.pad(DEPTH, margin)
+    camera = CAMERA.cropped(-margin, -margin, image.shape[1], image.shape[0])
+    left, top, width, height = region_of_interest(model, camera, START, SnapConfig())
+    assert width * height < 0.5 * image.size
+    crop = np.ascontiguousarray(image[top : top + height, left : left + width])
+    job = new_job(model, snapper.topic, depth=crop, camera=camera.cropped(left, top, width, height))
+    outcome, _ = request(snapper, job, model)
+    result = result_of(outcome)
+    assert isinstance(result, JobResult)
+    assert_same(result.estimate, done_here(new_job(model, depth=image, camera=camera), model))
+    assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.005
+
+
+def test_progress_arrives_while_it_runs(snapper, model):
+    outcome, cancel = request(snapper, new_job(model, snapper.topic, SLOW), model)
+    wait_until(lambda: len(outcome.shares) >= 5, "progress")
+    assert not outcome.ended.is_set()
+    cancel()
+    assert outcome.shares == sorted(outcome.shares) and 0 < outcome.shares[0] <= 1
+
+
+def test_a_cancelled_snap_brings_nothing_and_its_worker_is_free_at_once(snapper, model):
+    outcome, cancel = request(snapper, new_job(model, snapper.topic, SLOW), model)
+    assert outcome.moved.wait(LONGEST)
+    assert busy(snapper) == 1
+    began = time.monotonic()
+    cancel()
+    assert time.monotonic() - began < 0.2
+    wait_until(lambda: busy(snapper) == 0, "the worker to stop", seconds=2.0)
+    count = len(outcome.shares)
+    other, _ = request(snapper, new_job(model, snapper.topic), model)
+    assert isinstance(result_of(other), JobResult)
+    assert len(outcome.shares) == count and outcome.ends == []
+    cancel()  # once more does no harm
+
+
+def test_cancelling_one_of_many_lets_the_next_begin(snapper, model):
+    running = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
+    assert all(outcome.moved.wait(LONGEST) for outcome, _ in running)
+    waiting, cancel_waiting = request(snapper, new_job(model, snapper.topic, SLOW), model)
+    last, _ = request(snapper, new_job(model, snapper.topic), model)
+    cancel_waiting()
+    running[0][1]()
+    assert isinstance(result_of(last), JobResult)
+    assert waiting.shares == [] and not running[1][0].ended.is_set()
+    running[1][1]()
+    wait_until(lambda: busy(snapper) == 0, "the workers to stop")
+
+
+def test_an_object_that_no_worker_knows_is_sent_along(snapper):
+    unknown = new_model()
+    assert knowing(snapper, unknown.content_hash) == 0
+    outcome, _ = request(snapper, new_job(unknown, snapper.topic), unknown)
+    assert isinstance(result_of(outcome), JobResult)
+    assert knowing(snapper, unknown.content_hash) == 1
+
+
+def test_a_prepared_object_is_with_every_worker(snapper):
+    prepared = new_model()
+    snapper.prepare(prepared)
+    wait_until(lambda: knowing(snapper, prepared.content_hash) == 2, "the workers to be prepared")
+
+
+def test_a_snap_that_cannot_work_says_why(snapper, model):
+    far = T_CAMERA_TOOL.copy()
+    far[:3, 3] = [50.0, 0.0, 1.0]
+    outcome, _ = request(snapper, new_job(model, snapper.topic, T_camera_object=far), model)
+    end = result_of(outcome)
+    assert isinstance(end, SnapError)
+    assert str(end).startswith("The snap cannot work on this: T_camera_object puts the object wholly outside")
+
+
+def test_what_nobody_foresaw_fails_the_snap_too(snapper, model):
+    job = new_job(model, snapper.topic, config=None, camera="no camera")
+    outcome, _ = request(snapper, job, model)
+    end = result_of(outcome)
+    assert isinstance(end, SnapError) and "the server's log says why" in str(end)
+
+
+def test_a_worker_that_dies_in_mid_snap_fails_that_snap_only(snapper, model):
+    assert snapper.worker_count() == 2
+    doomed, _ = request(snapper, new_job(model, snapper.topic, SnapConfig.paper()), model)
+    assert doomed.moved.wait(LONGEST)
+    client = snapper._client.result()
+    (address,) = [worker for worker, count in executing(snapper).items() if count]
+    os.kill(client.run(os.getpid, workers=[address])[address], signal.SIGKILL)
+    end = result_of(doomed)
+    assert isinstance(end, SnapError) and str(end) == DIED
+    for _ in range(3):
+        outcome, _ = request(snapper, new_job(model, snapper.topic), model)
+        assert isinstance(result_of(outcome), JobResult)
+    wait_until(lambda: snapper.worker_count() == 2, "another worker in its place")
+
+
+def test_without_a_scheduler_a_snap_says_so(model, tmp_path):
+    with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
+        alone = Snapper("tcp://127.0.0.1:1", 1, tmp_path)
+        with pytest.raises(OSError, match="Timed out"):
+            alone.wait_until_ready()
+    assert alone.worker_count() == 0
+    outcome, cancel = request(alone, new_job(model), model)
+    end = result_of(outcome)
+    assert isinstance(end, SnapError) and str(end) == UNREACHABLE
+    cancel()
+    alone.close()

@@ -1,0 +1,112 @@
+"""What runs inside a worker process, run in one."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from distributed import Client
+
+from app import worker
+from app.worker import SnapCancelledError
+from registration_core import ObjectModel, SnapConfig
+from tests.app.snap_jobs import T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
+from tests.app.waiting import LONGEST, wait_until
+
+
+@pytest.fixture(scope="module")
+def client(cluster: str) -> Iterator[Client]:
+    with Client(cluster, set_as_default=False) as connected:
+        yield connected
+
+
+@pytest.fixture(scope="module")
+def addresses(client: Client) -> list[str]:
+    return sorted(client.scheduler_info(n_workers=-1)["workers"])
+
+
+@pytest.fixture
+def model() -> ObjectModel:
+    return new_model()
+
+
+def run(client: Client, address: str, function: Any, *arguments: Any) -> Any:
+    return client.submit(function, *arguments, workers=[address], pure=False).result(LONGEST)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        SnapConfig(),
+        SnapConfig.from_dict({"preset": "paper", "particle_filter": {"particles": 60, "iterations": 20}}),
+    ],
+    ids=["fast", "paper"],
+)
+def test_it_finds_what_the_library_finds(client, addresses, model, config):
+    job = new_job(model, config=config)
+    result = run(client, addresses[0], worker.run_snap, job, model)
+    assert_same(result.estimate, done_here(job, model))
+    assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
+    assert result.hardware
+
+
+def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model):
+    here, there = addresses
+    assert run(client, here, worker.run_snap, new_job(model), None) is None
+    assert run(client, here, worker.run_snap, new_job(model), model) is not None
+    assert run(client, here, worker.run_snap, new_job(model), None) is not None
+    assert run(client, there, worker.run_snap, new_job(model), None) is None
+
+
+def test_a_prepared_object_need_not_be_sent(client, addresses, model, tmp_path):
+    run(client, addresses[1], worker.prepare, model, tmp_path)
+    assert any(tmp_path.rglob("*.npz"))
+    assert run(client, addresses[1], worker.run_snap, new_job(model), None) is not None
+    run(client, addresses[0], worker.prepare, new_model(), None)
+
+
+def test_progress_is_told_by_snap(client, addresses, model):
+    told: list[dict[str, Any]] = []
+    topic = f"progress of {model.content_hash}"
+    client.subscribe_topic(topic, lambda event: told.append(event[1]))
+    config = SnapConfig.from_dict(
+        {"preset": "paper", "particle_filter": {"particles": 60, "iterations": 300}}
+    )
+    job = new_job(model, topic, config)
+    run(client, addresses[0], worker.run_snap, job, model)
+    wait_until(lambda: told, "progress")
+    client.unsubscribe_topic(topic)
+    assert {report["snap_id"] for report in told} == {job.snap_id}
+    shares = [report["progress"] for report in told]
+    assert shares == sorted(shares) and 0 < shares[0] and shares[-1] <= 1
+
+
+def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model):
+    job = new_job(model)
+    client.run(worker.cancel, job.snap_id)
+    with pytest.raises(SnapCancelledError):
+        run(client, addresses[0], worker.run_snap, job, model)
+
+
+def test_a_bad_job_is_refused_by_name(client, addresses, model):
+    far = T_CAMERA_TOOL.copy()
+    far[:3, 3] = [50.0, 0.0, 1.0]
+    with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
+        run(client, addresses[0], worker.run_snap, new_job(model, T_camera_object=far), model)
+
+
+def test_only_the_recent_objects_are_kept(monkeypatch):
+    monkeypatch.setattr(worker, "_models", type(worker._models)())
+    monkeypatch.setattr(worker, "KEPT_MODELS", 2)
+    models = [new_model() for _ in range(3)]
+    for kept in models:
+        worker.prepare(kept, None)
+    assert list(worker._models) == [kept.content_hash for kept in models[1:]]
+    assert worker.run_snap(new_job(models[0]), None) is None
+
+
+def test_the_module_is_a_dask_preload(client):
+    kept = client.run(lambda: Path(__import__("app.worker").worker.__file__).name)
+    assert set(kept.values()) == {"worker.py"}
+    assert callable(worker.dask_setup)
