@@ -1,0 +1,31 @@
+"""Fixtures: a small dataset, and an export of it."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from .site import ExportedSite, Site, make_site
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[Site]:
+    """A dataset in which nothing is submitted."""
+    site = make_site(tmp_path)
+    yield site
+    site.database.close()
+
+
+@pytest.fixture(scope="package")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ExportedSite]:
+    """An export to read from, not to change."""
+    exported = ExportedSite(tmp_path_factory.mktemp("exported"))
+    yield exported
+    exported.site.database.close()
+
+
+@pytest.fixture
+def export_copy(exported: ExportedSite, tmp_path: Path) -> Path:
+    """A copy of the export, to be damaged."""
+    return Path(shutil.copytree(exported.root, tmp_path / "copy"))

@@ -1,0 +1,204 @@
+"""Whole exports: the same bytes each time, nothing half-written, and a job that says how it ended."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.export import job
+from app.export.gate_instance import GateError
+from app.export.job import ExportSummary, export_dataset, run_job
+from app.export.selection import ExportError
+from app.tables import Export
+from registration_core import pose
+
+from .site import NEAR_VIEW, POSED, TOOL, Site, ignore_progress, true_pose
+
+
+def export(site: Site, target: Path) -> ExportSummary:
+    return export_dataset(site.database, site.files, site.dataset_id, target, ignore_progress)
+
+
+def request(site: Site) -> int:
+    """A queued export; its id."""
+    with site.database.write() as session:
+        row = Export(dataset_id=site.dataset_id, format="bop", user_id=site.users[0])
+        session.add(row)
+        session.flush()
+        return row.id
+
+
+def row_of(site: Site, export_id: int) -> Export:
+    with site.database.read() as session:
+        return session.get_one(Export, export_id)
+
+
+def submit_floating(site: Site) -> None:
+    """A pose 6 cm too near to the camera of image 0: the tool floats in the air."""
+    T_camera_object = pose.inverse(NEAR_VIEW) @ true_pose(POSED, TOOL)
+    T_camera_object[2, 3] -= 0.06
+    site.submit(site.tasks[POSED, TOOL], NEAR_VIEW @ T_camera_object)
+
+
+def test_the_same_annotations_give_the_same_bytes(site: Site, tmp_path: Path) -> None:
+    site.submit_all()
+    summary = export(site, tmp_path / "1.zip")
+    export(site, tmp_path / "2.zip")
+    assert (tmp_path / "1.zip").read_bytes() == (tmp_path / "2.zip").read_bytes()
+    assert summary == ExportSummary("Two_boxes_v1", scenes=2, images=7, annotations=6)
+
+
+def test_a_zip_holds_what_a_folder_gets(site: Site, tmp_path: Path) -> None:
+    site.submit_all()
+    export(site, tmp_path / "data.zip")
+    export(site, tmp_path / "folder")
+    with zipfile.ZipFile(tmp_path / "data.zip") as zipped:
+        packed = {name.removeprefix("Two_boxes_v1/"): zipped.read(name) for name in zipped.namelist()}
+    on_disk = {
+        path.relative_to(tmp_path / "folder").as_posix(): path.read_bytes()
+        for path in (tmp_path / "folder").rglob("*")
+        if path.is_file()
+    }
+    assert packed == on_disk
+    assert "interaction_log/events.parquet" in packed
+
+
+def test_progress_never_goes_back_and_ends_at_1(site: Site, tmp_path: Path) -> None:
+    site.submit_all()
+    reports: list[tuple[float, str]] = []
+    export_dataset(
+        site.database, site.files, site.dataset_id, tmp_path / "x.zip", lambda *report: reports.append(report)
+    )
+    shares = [share for share, _ in reports]
+    assert shares == sorted(shares) and shares[0] >= 0.0 and shares[-1] == 1.0
+    assert any("writing test/000001, image 5" in message for _, message in reports)
+
+
+def test_an_existing_folder_is_not_touched(site: Site, tmp_path: Path) -> None:
+    site.submit_all()
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(ExportError, match="exists; choose another folder"):
+        export(site, tmp_path / "folder")
+
+
+def test_a_pose_off_the_measured_surface_stops_the_export(site: Site, tmp_path: Path) -> None:
+    submit_floating(site)
+    before = set(tmp_path.iterdir())
+    with pytest.raises(
+        GateError,
+        match=r"^test/000001, image 0, object 3 \(entry 0\): the surface in this pose is \d+ mm off",
+    ):
+        export(site, tmp_path / "x.zip")
+    assert set(tmp_path.iterdir()) == before
+
+
+def test_a_pose_a_few_millimetres_off_passes(site: Site, tmp_path: Path) -> None:
+    site.submit(site.tasks[POSED, TOOL], true_pose(POSED, TOOL) @ pose.exp([0.004, 0.003, 0, 0, 0, 0.05]))
+    assert export(site, tmp_path / "x.zip").annotations == 1
+
+
+def test_a_job_ends_with_a_stored_zip(site: Site) -> None:
+    site.submit_all()
+    export_id = request(site)
+    assert run_job(site.database, site.files, export_id)
+    row = row_of(site, export_id)
+    assert (row.state, row.progress) == ("done", 1.0)
+    assert row.message == "scenes: 2, images: 7, objects: 6"
+    with zipfile.ZipFile(site.files.path(row.file_hash)) as zipped:
+        assert zipped.testzip() is None
+        gt = json.loads(zipped.read("Two_boxes_v1/test/000002/scene_gt.json"))
+    np.testing.assert_allclose(
+        gt["0"][0]["cam_t_m2c"], 1000 * (pose.inverse(NEAR_VIEW) @ true_pose(POSED, TOOL))[:3, 3]
+    )
+
+
+def test_equal_exports_are_stored_once(site: Site) -> None:
+    site.submit_all()
+    jobs = [request(site) for _ in range(2)]
+    assert all(run_job(site.database, site.files, export_id) for export_id in jobs)
+    assert len({row_of(site, export_id).file_hash for export_id in jobs}) == 1
+
+
+@pytest.mark.parametrize(
+    ("prepare", "message"),
+    [
+        (lambda site: None, "has no submitted registration; submit at least one, then export again"),
+        (submit_floating, "test/000001, image 0, object 3 (entry 0): the surface in this pose is"),
+    ],
+)
+def test_a_failed_job_says_why_and_serves_nothing(site: Site, prepare: object, message: str) -> None:
+    prepare(site)
+    export_id = request(site)
+    stored = sorted(site.files.root.rglob("*"))
+    assert not run_job(site.database, site.files, export_id)
+    row = row_of(site, export_id)
+    assert row.state == "failed" and message in row.message and row.file_hash is None
+    assert sorted(site.files.root.rglob("*")) == stored
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device"), "the disk is full; free some space"),
+        (RuntimeError("surprise"), "the export failed unexpectedly (RuntimeError: surprise)"),
+    ],
+)
+def test_what_nobody_foresaw_fails_the_job_too(
+    site: Site, monkeypatch: pytest.MonkeyPatch, error: Exception, message: str
+) -> None:
+    def broken(*arguments: object) -> None:
+        raise error
+
+    site.submit_all()
+    export_id = request(site)
+    monkeypatch.setattr(job, "pack", broken)
+    assert not run_job(site.database, site.files, export_id)
+    assert row_of(site, export_id).state == "failed"
+    assert message in row_of(site, export_id).message
+    assert not list(site.files.root.glob("*export*"))
+
+
+def test_a_stopped_job_says_so(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*arguments: object) -> None:
+        raise SystemExit(1)
+
+    site.submit_all()
+    export_id = request(site)
+    monkeypatch.setattr(job, "pack", stopped)
+    with pytest.raises(SystemExit):
+        run_job(site.database, site.files, export_id)
+    row = row_of(site, export_id)
+    assert (row.state, row.message) == ("failed", "the export was stopped; start it again")
+    assert not list(site.files.root.glob("*export*"))
+
+
+def test_only_a_queued_export_is_started(site: Site) -> None:
+    site.submit_all()
+    export_id = request(site)
+    run_job(site.database, site.files, export_id)
+    with pytest.raises(ExportError, match=rf"export {export_id} is done; only a queued export"):
+        run_job(site.database, site.files, export_id)
+    with pytest.raises(ExportError, match="export 99 does not exist"):
+        run_job(site.database, site.files, 99)
+
+
+def test_a_job_runs_as_a_process_of_its_own(site: Site) -> None:
+    site.submit_all()
+    export_id = request(site)
+    environment = {**os.environ, "SNAP6D_STATE_DIR": str(site.folder)}
+
+    def run(argument: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "app.export", argument]
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+    assert run(str(export_id)).returncode == 0
+    assert row_of(site, export_id).state == "done"
+    again = run(str(export_id))
+    assert again.returncode == 1
+    assert again.stderr.strip() == f"export {export_id} is done; only a queued export can be started"
