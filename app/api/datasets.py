@@ -1,0 +1,94 @@
+"""Datasets: what there is, and taking one in."""
+
+import tempfile
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, File, HTTPException, UploadFile
+from pydantic import BaseModel
+from sqlalchemy import distinct, func, select
+from sqlalchemy.orm import Session
+
+from app.api.dependencies import AdminDep, AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of
+from app.api.problems import InputError
+from app.importing import import_archive
+from app.tables import Dataset, Object, Registration, Scene, Task
+
+router = APIRouter(prefix="/api/datasets", tags=["datasets"])
+
+MEGABYTE = 2**20
+
+
+class DatasetOut(BaseModel):
+    """A dataset and how far its work is."""
+
+    id: int
+    name: str
+    objects: int
+    scenes: int
+    tasks: int
+    tasks_submitted: int
+    created_at: datetime
+
+
+@router.get("")
+def list_datasets(
+    services: ServicesDep, _identity: IdentityDep, after: AfterDep = 0, limit: LimitDep = 100
+) -> Page:
+    """All datasets."""
+    with services.database.read() as session:
+        return page_of(session, select(Dataset), Dataset.id, after, limit, lambda row: _out(session, row))
+
+
+@router.get("/{dataset_id}")
+def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -> DatasetOut:
+    """One dataset."""
+    with services.database.read() as session:
+        row = session.get(Dataset, dataset_id)
+        if row is None:
+            raise HTTPException(404, f"There is no dataset {dataset_id}.")
+        return _out(session, row)
+
+
+@router.post("", status_code=201)
+def upload_dataset(
+    file: Annotated[UploadFile, File(description="A zip file with one BOP dataset.")],
+    services: ServicesDep,
+    identity: AdminDep,
+) -> DatasetOut:
+    """Take a BOP dataset in from a zip file; checked whole before anything is kept."""
+    max_bytes = services.settings.max_upload_mb * MEGABYTE
+    if (file.size or 0) > max_bytes:
+        raise HTTPException(413, f"The upload is larger than {services.settings.max_upload_mb} MB.")
+    services.settings.state_dir.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=services.settings.state_dir) as folder:
+        archive = Path(folder) / "upload.zip"
+        with archive.open("wb") as target:
+            while chunk := file.file.read(MEGABYTE):
+                target.write(chunk)
+        try:
+            name = Path(file.filename or "dataset").stem
+            summary = import_archive(services.database, services.files, archive, name, max_bytes)
+        except ValueError as error:
+            raise InputError(f"{error}.") from error
+    return get_dataset(summary.dataset_id, services, identity)
+
+
+def _out(session: Session, row: Dataset) -> DatasetOut:
+    tasks = select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id)
+    submitted = (
+        select(func.count(distinct(Registration.task_id)))
+        .join(Registration.task)
+        .join(Task.scene)
+        .where(Scene.dataset_id == row.id, Registration.state == "submitted")
+    )
+    return DatasetOut(
+        id=row.id,
+        name=row.name,
+        objects=session.scalar(select(func.count(Object.id)).where(Object.dataset_id == row.id)) or 0,
+        scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
+        tasks=session.scalar(tasks) or 0,
+        tasks_submitted=session.scalar(submitted) or 0,
+        created_at=row.created_at,
+    )

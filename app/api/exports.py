@@ -1,0 +1,114 @@
+"""Exports: starting one, how far it is, and the finished archive."""
+
+from datetime import datetime
+from typing import Literal
+
+from fastapi import APIRouter, HTTPException
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, Field
+from sqlalchemy import select
+from sqlalchemy.orm import joinedload
+
+from app.api.dependencies import AdminDep, AfterDep, Id, LimitDep, Page, QueryId, ServicesDep, page_of
+from app.api.problems import InputError
+from app.services import Services
+from app.tables import Dataset, Export
+
+router = APIRouter(prefix="/api/exports", tags=["exports"])
+
+
+class NewExport(BaseModel):
+    """What is to be exported, and how."""
+
+    dataset_id: int = Field(ge=1, le=2**31 - 1)
+    format: Literal["bop"] = "bop"
+
+
+class ExportId(BaseModel):
+    """The export that was begun."""
+
+    id: int
+
+
+class ExportOut(BaseModel):
+    """How an export stands."""
+
+    id: int
+    dataset_id: int
+    dataset_name: str
+    format: str
+    state: str
+    progress: float
+    message: str
+    created_at: datetime
+    bytes: int | None
+    download_url: str | None
+
+
+@router.post("", status_code=202)
+def start_export(body: NewExport, services: ServicesDep, identity: AdminDep) -> ExportId:
+    """Start an export of all submitted poses of a dataset."""
+    with services.database.read() as session:
+        if session.get(Dataset, body.dataset_id) is None:
+            raise InputError(f"dataset_id {body.dataset_id} is no dataset; choose one of GET /api/datasets.")
+    return ExportId(id=services.export_jobs.start(body.dataset_id, body.format, identity.user_id).id)
+
+
+@router.get("")
+def list_exports(
+    services: ServicesDep,
+    _identity: AdminDep,
+    dataset_id: QueryId = None,
+    after: AfterDep = 0,
+    limit: LimitDep = 100,
+) -> Page:
+    """All exports, or those of one dataset."""
+    query = select(Export).options(joinedload(Export.dataset))
+    if dataset_id is not None:
+        query = query.where(Export.dataset_id == dataset_id)
+    with services.database.read() as session:
+        return page_of(session, query, Export.id, after, limit, lambda row: _out(services, row))
+
+
+@router.get("/{export_id}")
+def get_export(export_id: Id, services: ServicesDep, _identity: AdminDep) -> ExportOut:
+    """How an export stands."""
+    return _out(services, _export(services, export_id))
+
+
+@router.get("/{export_id}/download", response_class=FileResponse)
+def download(export_id: Id, services: ServicesDep, _identity: AdminDep) -> FileResponse:
+    """The finished archive; parts of it by Range, named by its content."""
+    row = _export(services, export_id)
+    if row.file_hash is None:
+        raise HTTPException(409, f"Export {export_id} is {row.state}; there is nothing to download.")
+    return FileResponse(
+        services.files.path(row.file_hash),
+        media_type="application/zip",
+        filename=f"{row.dataset.name}-{row.file_hash[:12]}.zip",
+        headers={"etag": f'"{row.file_hash}"'},
+    )
+
+
+def _export(services: Services, export_id: int) -> Export:
+    with services.database.read() as session:
+        row = session.get(Export, export_id, options=[joinedload(Export.dataset)])
+    if row is None:
+        raise HTTPException(404, f"There is no export {export_id}.")
+    return row
+
+
+def _out(services: Services, row: Export) -> ExportOut:
+    size = services.files.path(row.file_hash).stat().st_size if row.file_hash else None
+    return ExportOut(
+        id=row.id,
+        dataset_id=row.dataset_id,
+        dataset_name=row.dataset.name,
+        format=row.format,
+        state=row.state,
+        progress=row.progress,
+        message=row.message,
+        created_at=row.created_at,
+        bytes=size,
+        download_url=f"/api/exports/{row.id}/download" if row.file_hash else None,
+    )

@@ -1,0 +1,224 @@
+"""Registrations: their state, what an operator or a script may do, the log, and the stream of changes."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from datetime import datetime
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Depends
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from pydantic import BaseModel, Field
+from sqlalchemy import select
+
+from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of, rigid_pose
+from app.auth import Actor
+from app.labeling.desk import Seat
+from app.labeling.session import LabelingSession, SessionState
+from app.tables import Event, Pose
+from registration_core import pose
+
+router = APIRouter(prefix="/api/registrations", tags=["registrations"])
+
+SECONDS_BETWEEN_UPDATES = 0.05
+"""A stream tells no more often than that, and always tells the last state."""
+
+EXAMPLE_POSE = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]
+
+
+class SnapOut(BaseModel):
+    """The last snap of a registration."""
+
+    id: str
+    state: str
+    progress: float
+    message: str | None
+
+
+class OfferOut(BaseModel):
+    """A pose that the machine offers."""
+
+    snap_id: str
+    T_world_object: Pose
+    confidence: float
+
+
+class RegistrationOut(BaseModel):
+    """One operator's work on one task, now."""
+
+    id: int
+    task_id: int
+    state: str
+    frame_id: int
+    T_world_object: Pose
+    T_camera_object: Pose
+    confidence: float | None
+    can_undo: bool
+    can_redo: bool
+    dragging: bool
+    saved: bool
+    """Whether all of it is on the disk: a drag is when it ends."""
+    snap: SnapOut | None
+    offer: OfferOut | None
+    message: str | None
+    view_url: str
+
+
+class NewPose(BaseModel):
+    """Where the object is to be."""
+
+    T_world_object: Pose = Field(examples=[EXAMPLE_POSE])
+
+
+class FrameChoice(BaseModel):
+    """A frame of the scene."""
+
+    frame_id: int
+
+
+class EventOut(BaseModel):
+    """One line of the log."""
+
+    sequence: int
+    kind: str
+    actor: str
+    user_id: int
+    utc: datetime
+    monotonic_seconds: float
+    boot_id: str
+    duration_seconds: float | None
+    T_before: Pose | None
+    T_after: Pose | None
+    dof: list[str] | None
+    path: list[list[float]] | None
+    snap_id: str | None
+    detail: dict[str, Any]
+
+
+def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> Seat:
+    """The caller's own live session."""
+    return services.desk.seat(registration_id, identity)
+
+
+SeatDep = Annotated[Seat, Depends(my_seat)]
+
+
+@router.get("/{registration_id}")
+def get_registration(seat: SeatDep) -> RegistrationOut:
+    """How a registration of mine stands."""
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/pose")
+def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    """Put the object at a pose."""
+    seat.session.set_pose(rigid_pose(body.T_world_object, "T_world_object"), identity.actor)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/frame")
+def show_frame(body: FrameChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    """Show, and snap against, another frame of the scene."""
+    seat.session.show_frame(body.frame_id, identity.actor)
+    return registration_out(seat)
+
+
+def _add_action(name: str, act: Callable[[LabelingSession, Actor], None], summary: str) -> None:
+    def route(seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+        act(seat.session, identity.actor)
+        return registration_out(seat)
+
+    router.add_api_route(
+        f"/{{registration_id}}/{name}", route, methods=["POST"], summary=summary, name=f"{name}_registration"
+    )
+
+
+_add_action("undo", LabelingSession.undo, "Take the last change of pose back")
+_add_action("redo", LabelingSession.redo, "Bring back what was undone last")
+_add_action("reset", LabelingSession.reset, "Put the object back to where it began")
+_add_action("accept", LabelingSession.accept, "Take the pose that the machine offers")
+_add_action("dismiss", LabelingSession.dismiss, "Decline the pose that the machine offers")
+_add_action("submit", LabelingSession.submit, "Finish with the present pose")
+
+
+@router.get("/{registration_id}/events")
+def list_events(
+    registration_id: Id,
+    services: ServicesDep,
+    identity: IdentityDep,
+    after: AfterDep = 0,
+    limit: LimitDep = 100,
+) -> Page:
+    """The log of a registration: one's own, or anyone's for a reviewer."""
+    services.desk.check_readable(registration_id, identity)
+    query = select(Event).where(Event.registration_id == registration_id)
+    with services.database.read() as session:
+        return page_of(session, query, Event.sequence, after, limit, _event_out)
+
+
+@router.get("/{registration_id}/stream", response_class=EventSourceResponse)
+async def stream(seat: SeatDep, services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: the registration at once, and again whenever it changes."""
+    loop = asyncio.get_running_loop()
+    changed = asyncio.Event()
+    leave = services.desk.watch(seat)
+
+    def tell(_state: SessionState) -> None:
+        loop.call_soon_threadsafe(changed.set)
+
+    unsubscribe = seat.session.subscribe(tell)
+    try:
+        while True:
+            changed.clear()
+            out = await asyncio.to_thread(registration_out, seat)
+            yield ServerSentEvent(event="registration", data=out)
+            await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
+            await changed.wait()
+    finally:
+        unsubscribe()
+        leave()
+
+
+def registration_out(seat: Seat) -> RegistrationOut:
+    """A live session as JSON."""
+    state = seat.session.snapshot()
+    T_world_camera = np.array(seat.frames[state.frame_id].T_world_camera)
+    return RegistrationOut(
+        id=state.registration_id,
+        task_id=seat.registration.task_id,
+        state=state.state,
+        frame_id=state.frame_id,
+        T_world_object=state.T_world_object.tolist(),
+        T_camera_object=(pose.inverse(T_world_camera) @ state.T_world_object).tolist(),
+        confidence=state.confidence,
+        can_undo=state.can_undo,
+        can_redo=state.can_redo,
+        dragging=state.dragging,
+        saved=not state.dragging,
+        snap=_snap_out(state),
+        offer=_offer_out(state),
+        message=state.message,
+        view_url=f"/view/{state.registration_id}/",
+    )
+
+
+def _snap_out(state: SessionState) -> SnapOut | None:
+    snap = state.snap
+    if snap is None:
+        return None
+    return SnapOut(id=snap.id, state=snap.state, progress=snap.progress, message=snap.message)
+
+
+def _offer_out(state: SessionState) -> OfferOut | None:
+    offer = state.offer
+    if offer is None:
+        return None
+    return OfferOut(
+        snap_id=offer.snap_id,
+        T_world_object=offer.T_world_object.tolist(),
+        confidence=offer.confidence,
+    )
+
+
+def _event_out(row: Event) -> EventOut:
+    return EventOut(**{name: getattr(row, name) for name in EventOut.model_fields})

@@ -1,0 +1,135 @@
+"""Scenes, and the pictures of their frames."""
+
+import io
+from typing import Any
+
+from fastapi import APIRouter, HTTPException, Response
+from fastapi.responses import FileResponse
+from PIL import Image
+from pydantic import BaseModel
+from sqlalchemy import select
+from sqlalchemy.orm import selectinload
+
+from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, QueryId, ServicesDep, page_of
+from app.services import Services
+from app.tables import Frame, Pose, Scene
+
+router = APIRouter(prefix="/api", tags=["scenes"])
+
+FOREVER = {"cache-control": "private, max-age=31536000, immutable"}
+
+
+class Intrinsics(BaseModel):
+    """Of a pinhole camera, pixels."""
+
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+
+
+class FrameOut(BaseModel):
+    """One RGB-D image."""
+
+    id: int
+    image_id: int
+    width: int
+    height: int
+    intrinsics: Intrinsics
+    T_world_camera: Pose
+    depth_scale: float
+    """A raw depth value times this is millimetres."""
+    color_url: str | None
+    depth_url: str
+
+
+class SceneOut(BaseModel):
+    """One rigid world with its frames."""
+
+    id: int
+    dataset_id: int
+    split: str
+    bop_scene_id: int
+    label: str
+    frames: list[FrameOut]
+
+
+@router.get("/scenes")
+def list_scenes(
+    services: ServicesDep,
+    _identity: IdentityDep,
+    dataset_id: QueryId = None,
+    after: AfterDep = 0,
+    limit: LimitDep = 100,
+) -> Page:
+    """All scenes, or those of one dataset."""
+    query = select(Scene).options(selectinload(Scene.frames))
+    if dataset_id is not None:
+        query = query.where(Scene.dataset_id == dataset_id)
+    with services.database.read() as session:
+        return page_of(session, query, Scene.id, after, limit, _scene_out)
+
+
+@router.get("/scenes/{scene_id}")
+def get_scene(scene_id: Id, services: ServicesDep, _identity: IdentityDep) -> SceneOut:
+    """One scene with its frames."""
+    with services.database.read() as session:
+        row = session.get(Scene, scene_id)
+        if row is None:
+            raise HTTPException(404, f"There is no scene {scene_id}.")
+        return _scene_out(row)
+
+
+@router.get("/frames/{frame_id}/color.png", response_class=Response)
+def get_color(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+    """A frame's colour image; 404 where it has none."""
+    frame = _frame(services, frame_id)
+    if frame.color_hash is None:
+        raise HTTPException(404, f"Frame {frame_id} has no colour image.")
+    path = services.files.path(frame.color_hash)
+    with Image.open(path) as image:
+        if image.format == "PNG":
+            return FileResponse(path, media_type="image/png", headers=FOREVER)
+        content = io.BytesIO()
+        image.convert("RGB").save(content, "png")
+    return Response(content.getvalue(), media_type="image/png", headers=FOREVER)
+
+
+@router.get("/frames/{frame_id}/depth.png", response_class=FileResponse)
+def get_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> FileResponse:
+    """A frame's depth image, 16 bit; `depth_scale` turns its values into millimetres."""
+    frame = _frame(services, frame_id)
+    return FileResponse(services.files.path(frame.depth_hash), media_type="image/png", headers=FOREVER)
+
+
+def _frame(services: Services, frame_id: int) -> Frame:
+    with services.database.read() as session:
+        row = session.get(Frame, frame_id)
+    if row is None:
+        raise HTTPException(404, f"There is no frame {frame_id}.")
+    return row
+
+
+def _scene_out(row: Scene) -> SceneOut:
+    return SceneOut(
+        id=row.id,
+        dataset_id=row.dataset_id,
+        split=row.split,
+        bop_scene_id=row.bop_scene_id,
+        label=row.label,
+        frames=[FrameOut(**_frame_out(frame)) for frame in row.frames],
+    )
+
+
+def _frame_out(row: Frame) -> dict[str, Any]:
+    return {
+        "id": row.id,
+        "image_id": row.image_id,
+        "width": row.width,
+        "height": row.height,
+        "intrinsics": Intrinsics(fx=row.fx, fy=row.fy, cx=row.cx, cy=row.cy),
+        "T_world_camera": row.T_world_camera,
+        "depth_scale": row.depth_scale,
+        "color_url": f"/api/frames/{row.id}/color.png" if row.color_hash else None,
+        "depth_url": f"/api/frames/{row.id}/depth.png",
+    }

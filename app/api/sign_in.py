@@ -1,0 +1,84 @@
+"""Signing in and out."""
+
+from datetime import timedelta
+from typing import Annotated
+
+from fastapi import APIRouter, Cookie, HTTPException, Request, Response
+from pydantic import BaseModel, Field
+
+from app.api.dependencies import SESSION_COOKIE, IdentityDep, ServicesDep, is_same_origin
+from app.auth import LOGIN_LIFETIME
+
+router = APIRouter(prefix="/api", tags=["sign-in"])
+
+
+class Credentials(BaseModel):
+    """Name and password."""
+
+    name: str = Field(max_length=100, examples=["ann"])
+    password: str = Field(max_length=1000, examples=["correct horse battery"])
+
+
+class Link(BaseModel):
+    """The secret of a one-time sign-in link."""
+
+    token: str = Field(max_length=200)
+
+
+class Me(BaseModel):
+    """Whoever is signed in."""
+
+    id: int
+    name: str
+    role: str
+
+
+@router.post("/sign-in", status_code=204)
+def sign_in(body: Credentials, request: Request, services: ServicesDep) -> Response:
+    """Sign in with name and password: sets the login cookie."""
+    _refuse_foreign_page(request)
+    return _with_cookie(request, services.auth.sign_in(body.name, body.password), LOGIN_LIFETIME)
+
+
+@router.post("/sign-in/link", status_code=204)
+def sign_in_with_link(body: Link, request: Request, services: ServicesDep) -> Response:
+    """Sign in with a one-time link's secret: sets the login cookie and uses the link up."""
+    _refuse_foreign_page(request)
+    return _with_cookie(request, services.auth.sign_in_with_link(body.token), LOGIN_LIFETIME)
+
+
+@router.post("/sign-out", status_code=204)
+def sign_out(
+    request: Request,
+    services: ServicesDep,
+    secret: Annotated[str | None, Cookie(alias=SESSION_COOKIE)] = None,
+) -> Response:
+    """End the login session."""
+    _refuse_foreign_page(request)
+    if secret:
+        services.auth.sign_out(secret)
+    return _with_cookie(request, "", timedelta(0))
+
+
+@router.get("/me")
+def me(identity: IdentityDep) -> Me:
+    """Who is signed in."""
+    return Me(id=identity.user_id, name=identity.name, role=identity.role)
+
+
+def _refuse_foreign_page(request: Request) -> None:
+    if not is_same_origin(request, required=False):
+        raise HTTPException(403, "This request came from a foreign page and was refused.")
+
+
+def _with_cookie(request: Request, secret: str, lifetime: timedelta) -> Response:
+    response = Response(status_code=204)
+    response.set_cookie(
+        SESSION_COOKIE,
+        secret,
+        max_age=int(lifetime.total_seconds()),
+        httponly=True,
+        samesite="lax",
+        secure=request.url.scheme == "https",
+    )
+    return response

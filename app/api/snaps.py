@@ -1,0 +1,145 @@
+"""Snaps: asking for one, how it stands, and cancelling it."""
+
+from typing import Any, Literal
+
+from fastapi import APIRouter, HTTPException
+from pydantic import BaseModel, Field
+
+from app.api.dependencies import IdentityDep, ServicesDep
+from app.api.problems import InputError
+from app.api.registrations import SeatDep
+from app.auth import Identity
+from app.services import Services
+from app.tables import EstimateRow, Event, Pose
+from registration_core import SnapConfig
+
+router = APIRouter(prefix="/api", tags=["snaps"])
+
+SnapState = Literal["queued", "running", "done", "cancelled", "failed"]
+OUTCOMES: dict[str, SnapState] = {
+    "snap_applied": "done",
+    "snap_offered": "done",
+    "snap_cancelled": "cancelled",
+    "snap_failed": "failed",
+}
+INTERRUPTED = "The server stopped while this snap ran. Nothing is lost; ask for another one."
+
+
+class NewSnap(BaseModel):
+    """How to snap; everything has a default."""
+
+    seed: int | None = Field(None, ge=0, lt=2**63, description="For a result that can be repeated.")
+    config: dict[str, Any] | None = Field(
+        None, description='Changes to the default configuration, or {"preset": "paper"}.', examples=[{}]
+    )
+
+
+class SnapId(BaseModel):
+    """The snap that was begun."""
+
+    id: str
+
+
+class HypothesisOut(BaseModel):
+    """One of the poses that fit the data."""
+
+    T_camera_object: Pose
+    weight: float
+
+
+class EstimateOut(BaseModel):
+    """What a snap found."""
+
+    T_world_object: Pose
+    T_camera_object: Pose
+    confidence: float
+    covariance: list[list[float]]
+    hypotheses: list[HypothesisOut]
+    converged: bool
+    seed: int
+    config: dict[str, Any]
+    version: str
+    hardware: str
+    seconds: float
+    evaluations: int
+
+
+class SnapDetail(BaseModel):
+    """How a snap stands."""
+
+    id: str
+    registration_id: int
+    state: SnapState
+    progress: float
+    message: str | None
+    estimate: EstimateOut | None
+
+
+@router.post("/registrations/{registration_id}/snaps", status_code=202)
+def request_snap(seat: SeatDep, identity: IdentityDep, body: NewSnap | None = None) -> SnapId:
+    """Ask the machine for a better pose from the present one."""
+    wanted = body or NewSnap(seed=None, config=None)
+    try:
+        config = SnapConfig.from_dict(wanted.config or {})
+    except ValueError as error:
+        raise InputError(f"config: {error}.") from error
+    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed))
+
+
+@router.get("/snaps/{snap_id}")
+def get_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> SnapDetail:
+    """How a snap stands, with its estimate when it is done."""
+    events = _events(services, identity, snap_id)
+    registration_id = events[0].registration_id
+    outcome = next((event for event in events if event.kind in OUTCOMES), None)
+    if outcome is not None:
+        estimate = services.log.estimate(snap_id)
+        return SnapDetail(
+            id=snap_id,
+            registration_id=registration_id,
+            state=OUTCOMES[outcome.kind],
+            progress=1.0 if estimate else 0.0,
+            message=outcome.detail.get("message"),
+            estimate=_estimate_out(estimate) if estimate else None,
+        )
+    live = services.desk.live_snap(registration_id)
+    if live is not None and live.id == snap_id:
+        state: SnapState = "running" if live.state == "running" else "queued"
+        return _without_outcome(snap_id, registration_id, state, live.progress, live.message)
+    return _without_outcome(snap_id, registration_id, "failed", 0.0, INTERRUPTED)
+
+
+@router.delete("/snaps/{snap_id}")
+def cancel_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> SnapDetail:
+    """Cancel a snap of mine; one that has ended stays as it is."""
+    registration_id = _events(services, identity, snap_id)[0].registration_id
+    session = services.desk.seat(registration_id, identity).session
+    live = session.snapshot().snap
+    if live is not None and live.id == snap_id:
+        session.cancel_snap(identity.actor)
+    return get_snap(snap_id, services, identity)
+
+
+def _events(services: Services, identity: Identity, snap_id: str) -> list[Event]:
+    events = list(services.log.snap_events(snap_id))
+    if not events:
+        raise HTTPException(404, f"There is no snap {snap_id}.")
+    services.desk.check_readable(events[0].registration_id, identity)
+    return events
+
+
+def _without_outcome(
+    snap_id: str, registration_id: int, state: SnapState, progress: float, message: str | None
+) -> SnapDetail:
+    return SnapDetail(
+        id=snap_id,
+        registration_id=registration_id,
+        state=state,
+        progress=progress,
+        message=message,
+        estimate=None,
+    )
+
+
+def _estimate_out(row: EstimateRow) -> EstimateOut:
+    return EstimateOut(**{name: getattr(row, name) for name in EstimateOut.model_fields})

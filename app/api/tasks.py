@@ -1,0 +1,227 @@
+"""Tasks: what is to be registered, and taking one up."""
+
+from typing import Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, HTTPException, Response
+from pydantic import BaseModel, Field
+from sqlalchemy import ColumnElement, Select, select
+from sqlalchemy.orm import Session, joinedload, selectinload
+
+from app.api.dependencies import (
+    AdminDep,
+    AfterDep,
+    Id,
+    IdentityDep,
+    LimitDep,
+    Page,
+    QueryId,
+    ServicesDep,
+    page_of,
+)
+from app.api.problems import InputError
+from app.api.registrations import RegistrationOut, registration_out
+from app.scene_data import camera_of
+from app.services import Services
+from app.start_pose import start_pose
+from app.tables import Frame, Object, Registration, Scene, Task
+from app.thumbnails import task_thumbnail
+
+router = APIRouter(prefix="/api/tasks", tags=["tasks"])
+
+TaskState = Literal["open", "in_progress", "submitted"]
+Mode = Literal["accurate", "quick"]
+Condition = Literal["manual", "snap", "auto"]
+
+
+class NewTask(BaseModel):
+    """What is asked for."""
+
+    scene_id: int = Field(ge=1, le=2**31 - 1)
+    object_id: int = Field(ge=1, le=2**31 - 1)
+    mode: Mode = "accurate"
+    condition: Condition = "snap"
+
+
+class Named(BaseModel):
+    """A thing that a task refers to."""
+
+    id: int
+    name: str
+
+
+class SceneRef(BaseModel):
+    """The scene of a task."""
+
+    id: int
+    label: str
+
+
+class ObjectRef(BaseModel):
+    """The object of a task."""
+
+    id: int
+    obj_id: int
+    name: str
+
+
+class OperatorRef(BaseModel):
+    """Who works on a task, and how far they are."""
+
+    name: str
+    state: str
+
+
+class TaskOut(BaseModel):
+    """An object of a scene that is to be registered."""
+
+    id: int
+    dataset: Named
+    scene: SceneRef
+    object: ObjectRef
+    instance: int
+    frame_id: int
+    mode: str
+    condition: str
+    state: TaskState
+    operators: list[OperatorRef]
+    mine: int | None
+    """My registration's id, where I have begun one."""
+    thumbnail_url: str
+
+
+@router.get("")
+def list_tasks(
+    services: ServicesDep,
+    identity: IdentityDep,
+    dataset_id: QueryId = None,
+    scene_id: QueryId = None,
+    state: TaskState | None = None,
+    after: AfterDep = 0,
+    limit: LimitDep = 100,
+) -> Page:
+    """All tasks, or those of a dataset, a scene, or in a state."""
+    query = _tasks()
+    if dataset_id is not None:
+        query = query.join(Task.scene).where(Scene.dataset_id == dataset_id)
+    if scene_id is not None:
+        query = query.where(Task.scene_id == scene_id)
+    if state is not None:
+        query = query.where(_is_in_state(state))
+    with services.database.read() as session:
+        return page_of(session, query, Task.id, after, limit, lambda row: _out(row, identity.user_id))
+
+
+@router.get("/next")
+def next_task(services: ServicesDep, identity: IdentityDep) -> TaskOut:
+    """What I should do next: what I have begun, or else what nobody has; 404 where nothing is left."""
+    mine = Task.registrations.any((Registration.user_id == identity.user_id) & (Registration.state == "open"))
+    with services.database.read() as session:
+        for condition in (mine, _is_in_state("open")):
+            row = session.scalars(_tasks().where(condition).order_by(Task.id).limit(1)).unique().first()
+            if row is not None:
+                return _out(row, identity.user_id)
+    raise HTTPException(404, "All tasks are done or in other hands.")
+
+
+@router.get("/{task_id}")
+def get_task(task_id: Id, services: ServicesDep, identity: IdentityDep) -> TaskOut:
+    """One task."""
+    with services.database.read() as session:
+        return _out(_task(session, task_id), identity.user_id)
+
+
+@router.post("", status_code=201)
+def create_task(body: NewTask, services: ServicesDep, identity: AdminDep) -> TaskOut:
+    """Ask for one more instance of an object in a scene."""
+    with services.database.read() as session:
+        scene, item = session.get(Scene, body.scene_id), session.get(Object, body.object_id)
+        if scene is None:
+            raise InputError(f"scene_id {body.scene_id} is no scene; choose one of GET /api/scenes.")
+        if item is None or item.dataset_id != scene.dataset_id:
+            raise InputError(
+                f"object_id {body.object_id} is no object of the scene's dataset;"
+                f" choose one of GET /api/objects?dataset_id={scene.dataset_id}."
+            )
+        frame = scene.frames[0]
+    start = _start(services, item, frame)
+    with services.database.write() as session:
+        same = select(Task.instance).filter_by(
+            scene_id=scene.id, object_id=item.id, mode=body.mode, condition=body.condition
+        )
+        task = Task(
+            scene_id=scene.id,
+            object_id=item.id,
+            instance=max(session.scalars(same), default=-1) + 1,
+            mode=body.mode,
+            condition=body.condition,
+            frame_id=frame.id,
+            T_world_object_start=start.tolist(),
+        )
+        session.add(task)
+        session.flush()
+        return _out(_task(session, task.id), identity.user_id)
+
+
+@router.get("/{task_id}/thumbnail.jpg", response_class=Response)
+def get_thumbnail(task_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+    """A small picture of the scene and of the object that is asked for."""
+    with services.database.read() as session:
+        task = _task(session, task_id)
+    picture = task_thumbnail(services.data.color(task.frame), services.data.model(task.object))
+    return Response(picture, media_type="image/jpeg", headers={"cache-control": "private, max-age=86400"})
+
+
+@router.post("/{task_id}/registration")
+def start_registration(task_id: Id, services: ServicesDep, identity: IdentityDep) -> RegistrationOut:
+    """Begin my registration of this task, or go on with it where I left it."""
+    return registration_out(services.desk.start(task_id, identity))
+
+
+def _start(services: Services, item: Object, frame: Frame) -> Any:
+    T_world_camera = np.array(frame.T_world_camera)
+    return start_pose(services.data.model(item), services.data.depth(frame), camera_of(frame), T_world_camera)
+
+
+def _tasks() -> Select[Task]:
+    return select(Task).options(
+        joinedload(Task.scene).joinedload(Scene.dataset),
+        joinedload(Task.object),
+        joinedload(Task.frame),
+        selectinload(Task.registrations).joinedload(Registration.user),
+    )
+
+
+def _task(session: Session, task_id: int) -> Task:
+    row = session.scalars(_tasks().where(Task.id == task_id)).unique().first()
+    if row is None:
+        raise HTTPException(404, f"There is no task {task_id}.")
+    return row
+
+
+def _is_in_state(state: TaskState) -> ColumnElement[bool]:
+    submitted = Task.registrations.any(Registration.state == "submitted")
+    if state == "submitted":
+        return submitted
+    if state == "in_progress":
+        return Task.registrations.any() & ~submitted
+    return ~Task.registrations.any()
+
+
+def _out(row: Task, user_id: int) -> TaskOut:
+    states = {registration.state for registration in row.registrations}
+    mine = next((r.id for r in row.registrations if r.user_id == user_id), None)
+    return TaskOut(
+        id=row.id,
+        dataset=Named(id=row.scene.dataset.id, name=row.scene.dataset.name),
+        scene=SceneRef(id=row.scene.id, label=row.scene.label),
+        object=ObjectRef(id=row.object.id, obj_id=row.object.obj_id, name=row.object.name),
+        instance=row.instance,
+        frame_id=row.frame_id,
+        mode=row.mode,
+        condition=row.condition,
+        state="submitted" if "submitted" in states else "in_progress" if states else "open",
+        operators=[OperatorRef(name=r.user.name, state=r.state) for r in row.registrations],
+        mine=mine,
+        thumbnail_url=f"/api/tasks/{row.id}/thumbnail.jpg",
+    )

@@ -1,0 +1,210 @@
+"""The command line. Heavy imports stay inside the commands: worker processes import this module too."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+if TYPE_CHECKING:
+    from app.config import Settings
+    from app.database import Database
+
+cli = typer.Typer(no_args_is_help=True, add_completion=False, help="Annotate 6-DoF object poses, with help.")
+token_cli = typer.Typer(no_args_is_help=True, help="API tokens for scripts and robots.")
+user_cli = typer.Typer(no_args_is_help=True, help="People who may sign in.")
+cli.add_typer(token_cli, name="token")
+cli.add_typer(user_cli, name="user")
+
+console = Console(highlight=False, soft_wrap=True)
+errors = Console(stderr=True, highlight=False, soft_wrap=True)
+
+RoleOption = Annotated[str, typer.Option(help="operator, reviewer or admin.")]
+
+
+def main() -> None:
+    """Run the command that was typed; what goes wrong is one sentence."""
+    try:
+        cli()
+    except Exception as error:
+        if os.environ.get("SNAP6D_DEBUG"):
+            raise
+        _fail(str(error) or type(error).__name__)
+
+
+@cli.command()
+def serve(
+    host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
+    port: Annotated[int | None, typer.Option(help="Port to listen on; 0 takes a free one.")] = None,
+    state_dir: Annotated[Path | None, typer.Option(help="Database, files and exports.")] = None,
+    database_url: Annotated[str | None, typer.Option(help="Another database, such as PostgreSQL.")] = None,
+    scheduler_address: Annotated[str | None, typer.Option(help="A Dask scheduler to use.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes to start here.")] = None,
+    prepare: Annotated[
+        bool, typer.Option("--prepare", help="Update the database and import the demo scenes first.")
+    ] = False,
+) -> None:
+    """Start Snap6D and print a link to sign in with."""
+    from app.snapping import create_snapper
+
+    given = {
+        "host": host,
+        "port": port,
+        "state_dir": state_dir,
+        "database_url": database_url,
+        "scheduler_address": scheduler_address,
+        "workers": workers,
+    }
+    settings = _settings(**given)
+    settings.state_dir.mkdir(parents=True, exist_ok=True)
+    snapper = create_snapper(settings)
+    try:
+        from app import server  # its imports take seconds, in which the workers start
+
+        server.run(settings, prepare, snapper, console.print)
+    finally:
+        snapper.close()
+
+
+@cli.command()
+def migrate() -> None:
+    """Make the database, or bring it up to this version."""
+    database = _database(_settings())
+    database.migrate()
+    console.print("The database is up to date.")
+
+
+@cli.command("import")
+def import_command(
+    path: Annotated[Path, typer.Argument(help="Folder of a BOP dataset.")],
+    name: Annotated[str | None, typer.Option(help="Another name for the dataset.")] = None,
+) -> None:
+    """Import a BOP dataset; repeating it adds only what is new."""
+    from app.importing import import_dataset
+    from app.storage import FileStore
+
+    settings = _settings()
+    database = _checked_database(settings)
+    with _progress() as progress:
+        task = progress.add_task("checking", total=1.0)
+        summary = import_dataset(
+            database,
+            FileStore(settings.files_dir),
+            path,
+            name,
+            lambda share, what: progress.update(task, completed=share, description=what),
+        )
+    console.print(
+        f"Dataset {summary.name}: {summary.objects} new objects, {summary.scenes} new scenes,"
+        f" {summary.frames} new frames, {summary.tasks} new tasks."
+    )
+
+
+@cli.command("export")
+def export_command(
+    dataset: Annotated[str, typer.Argument(help="Name of the dataset.")],
+    out: Annotated[Path, typer.Argument(help="Zip file to write.")],
+) -> None:
+    """Export the submitted poses of a dataset in BOP format, checked by reading them back."""
+    from sqlalchemy import select
+
+    from app.export.job import export_dataset
+    from app.storage import FileStore
+    from app.tables import Dataset
+
+    settings = _settings()
+    database = _checked_database(settings)
+    with database.read() as session:
+        row = session.scalar(select(Dataset).where(Dataset.name == dataset))
+        names = session.scalars(select(Dataset.name)).all()
+    if row is None:
+        _fail(f"there is no dataset {dataset!r}; there are: {', '.join(names) or 'none'}")
+    with _progress() as progress:
+        task = progress.add_task("exporting", total=1.0)
+        summary = export_dataset(
+            database,
+            FileStore(settings.files_dir),
+            row.id,
+            out,
+            lambda share, what: progress.update(task, completed=share, description=what),
+        )
+    console.print(
+        f"{out}: {summary.annotations} poses in {summary.images} images of {summary.scenes} scenes, read back"
+        " and found right."
+    )
+
+
+@token_cli.command("create")
+def create_token(name: str, role: RoleOption = "operator") -> None:
+    """Print an API token for NAME, once."""
+    from app.auth import Auth
+
+    console.print(Auth(_checked_database(_settings())).create_token(name, _role(role)))
+
+
+@user_cli.command("add")
+def add_user(
+    name: str,
+    role: RoleOption = "operator",
+    password: Annotated[bool, typer.Option("--password", help="Ask for a password now.")] = False,
+) -> None:
+    """Add a person, and print a one-time link to sign in with."""
+    from app.auth import Auth
+    from app.server import sign_in_link
+
+    settings = _settings()
+    auth = Auth(_checked_database(settings))
+    secret = typer.prompt("Password", hide_input=True, confirmation_prompt=True) if password else None
+    user = auth.create_user(name, _role(role), secret)
+    console.print(f"User {user.name} may sign in, once, with this link:")
+    console.print(sign_in_link(settings, settings.port, auth.create_link(user.id)))
+
+
+def _settings(**given: object) -> "Settings":
+    from pydantic import ValidationError
+
+    from app.config import Settings
+
+    try:
+        return Settings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0])
+        _fail(f"setting {name} (SNAP6D_{name.upper()}) is {first['input']!r}: {first['msg']}")
+
+
+def _database(settings: "Settings") -> "Database":
+    from app.database import Database
+
+    settings.state_dir.mkdir(parents=True, exist_ok=True)
+    return Database(settings.resolved_database_url)
+
+
+def _checked_database(settings: "Settings") -> "Database":
+    database = _database(settings)
+    database.check_version()
+    return database
+
+
+def _role(name: str):  # type: ignore[no-untyped-def] # Role is imported late
+    from app.auth import Role
+
+    if name not in set(Role):
+        _fail(f"role {name!r} is unknown; choose one of {', '.join(Role)}")
+    return Role(name)
+
+
+def _progress() -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn())
+    return Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal)
+
+
+def _fail(message: str) -> NoReturn:
+    errors.print(f"snap6d: {message}", markup=False)
+    raise SystemExit(1)
+
+
+if __name__ == "__main__":
+    main()

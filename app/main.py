@@ -1,0 +1,93 @@
+"""Joins the parts into one application; the only module that knows them all."""
+
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator
+
+import httpx
+from fastapi import FastAPI
+
+from app import __version__, pages
+from app.api import datasets, exports, health, objects, problems, registrations, scenes, sign_in, snaps, tasks
+from app.auth import Auth
+from app.config import Settings
+from app.database import Database
+from app.event_log import EventLog
+from app.export_jobs import ExportJobs
+from app.labeling import proxy
+from app.labeling.desk import Desk
+from app.scene_data import SceneData
+from app.services import Services
+from app.snapping import Snapper, create_snapper
+from app.storage import FileStore
+
+SECONDS_BETWEEN_CLEANINGS = 60.0
+
+
+def create_services(settings: Settings, snapper: Snapper | None = None) -> Services:
+    """Open the database and start the workers, unless they were started before.
+
+    Raises:
+        DatabaseError: where the database is not of this version.
+    """
+    database = Database(settings.resolved_database_url)
+    database.check_version()
+    files = FileStore(settings.files_dir)
+    log = EventLog(database)
+    data = SceneData(files)
+    snapper = snapper or create_snapper(settings)
+    return Services(
+        settings=settings,
+        database=database,
+        files=files,
+        auth=Auth(database),
+        log=log,
+        data=data,
+        snapper=snapper,
+        desk=Desk(database, log, data, snapper),
+        export_jobs=ExportJobs(database, settings),
+    )
+
+
+def create_app(services: Services) -> FastAPI:
+    """The web application around the services; it closes them when it ends."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        services.export_jobs.fail_interrupted()
+        cleaning = asyncio.create_task(_clean_up(services))
+        async with httpx.AsyncClient() as client:
+            app.state.http = client
+            yield
+        cleaning.cancel()
+        await asyncio.to_thread(_close, services)
+
+    app = FastAPI(
+        title="Snap6D",
+        version=__version__,
+        description="Human-in-the-loop annotation of 6-DoF object poses. Poses are 4x4 nested lists, metres.",
+        openapi_url="/api/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+        responses=problems.PROBLEM_RESPONSES,
+    )
+    app.state.services = services
+    problems.install(app)
+    for module in (health, sign_in, datasets, scenes, objects, tasks, registrations, snaps, exports, proxy):
+        app.include_router(module.router)
+    pages.install(app)
+    return app
+
+
+async def _clean_up(services: Services) -> None:
+    while True:
+        await asyncio.sleep(SECONDS_BETWEEN_CLEANINGS)
+        await asyncio.to_thread(services.desk.close_idle)
+
+
+def _close(services: Services) -> None:
+    services.desk.close()
+    services.export_jobs.close()
+    services.snapper.close()
+    services.database.close()

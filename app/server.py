@@ -1,0 +1,128 @@
+"""Runs the application on its one port."""
+
+import logging
+import socket
+import threading
+from collections.abc import Callable
+
+import rich
+import uvicorn
+from sqlalchemy import select
+
+from app.auth import Role
+from app.config import PROJECT, Settings
+from app.database import Database
+from app.importing import import_dataset
+from app.main import create_app, create_services
+from app.services import Services
+from app.snapping import Snapper
+from app.storage import FileStore
+from app.tables import Dataset
+
+DEMO_SCENES = PROJECT / "scenes" / "demo"
+LOCAL_ADMINISTRATOR = "admin"
+SECONDS_TO_FINISH = 3
+
+
+class ServeError(Exception):
+    """The server cannot start; the message says why and what to do."""
+
+
+def run(settings: Settings, prepare: bool, snapper: Snapper, say: Callable[[str], None]) -> None:
+    """Serve until stopped; when pages can be opened, tell a one-time sign-in link.
+
+    Args:
+        settings: Where to listen, and with what.
+        prepare: Update the database, and import the demo scenes where it is empty, before.
+        snapper: The workers, which may still be starting.
+        say: Tells the person at the console.
+
+    Raises:
+        ServeError: where the port or the workers cannot be had.
+        DatabaseError: where the database is not of this version.
+    """
+    rich.reconfigure(quiet=True)  # or viser announces the private address of every view
+    listener = _listen(settings)
+    if prepare:
+        prepare_state(settings, say)
+    services = create_services(settings, snapper)
+    config = uvicorn.Config(
+        create_app(services),
+        log_level="warning",
+        access_log=False,
+        ws_max_size=64 * 2**20,
+        timeout_graceful_shutdown=SECONDS_TO_FINISH,
+    )
+    server = _AnnouncingServer(config, lambda: _announce(services, listener, say))
+    failures: list[Exception] = []
+
+    def stop_without_workers() -> None:
+        try:
+            snapper.wait_until_ready()
+        except Exception as error:
+            failures.append(error)
+            server.should_exit = True
+
+    threading.Thread(target=stop_without_workers, daemon=True).start()
+    server.run(sockets=[listener])
+    if failures:
+        raise ServeError(f"the workers cannot be reached: {failures[0]}")
+
+
+def prepare_state(settings: Settings, say: Callable[[str], None]) -> None:
+    """Make or update the database, and import the demo scenes where it holds no dataset yet."""
+    database = Database(settings.resolved_database_url)
+    try:
+        database.migrate()
+        with database.read() as session:
+            is_empty = session.scalar(select(Dataset.id).limit(1)) is None
+        if is_empty and DEMO_SCENES.is_dir():
+            summary = import_dataset(database, FileStore(settings.files_dir), DEMO_SCENES)
+            say(f"Imported the demo scenes: {summary.tasks} tasks.")
+    finally:
+        database.close()
+
+
+def sign_in_link(settings: Settings, port: int, secret: str) -> str:
+    """Address that signs in, once; the secret stays behind the # and so out of every server's log."""
+    host = "localhost" if settings.host in {"127.0.0.1", "0.0.0.0", "::", "localhost"} else settings.host
+    named = f"[{host}]" if ":" in host else host  # an IPv6 address
+    base = settings.public_url.rstrip("/") or f"http://{named}:{port}"
+    return f"{base}/sign-in#{secret}"
+
+
+class _AnnouncingServer(uvicorn.Server):
+    """Says when it is ready."""
+
+    def __init__(self, config: uvicorn.Config, announce: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._announce = announce
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            self._announce()
+
+
+def _announce(services: Services, listener: socket.socket, say: Callable[[str], None]) -> None:
+    user = services.auth.ensure_user(LOCAL_ADMINISTRATOR, Role.ADMIN)
+    port = listener.getsockname()[1]
+    say("Snap6D is ready. Open this link to sign in; it works once:")
+    say(sign_in_link(services.settings, port, services.auth.create_link(user.id)))
+
+
+def _listen(settings: Settings) -> socket.socket:
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise ServeError(
+            f"port {settings.port} on {settings.host} cannot be used ({error.strerror});"
+            " stop what uses it, or choose another with --port"
+        ) from error
+    logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
+    return listener

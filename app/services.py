@@ -1,0 +1,28 @@
+"""The parts of a running application, joined once and handed to the routes."""
+
+from dataclasses import dataclass
+
+from app.auth import Auth
+from app.config import Settings
+from app.database import Database
+from app.event_log import EventLog
+from app.export_jobs import ExportJobs
+from app.labeling.desk import Desk
+from app.scene_data import SceneData
+from app.snapping import Snapper
+from app.storage import FileStore
+
+
+@dataclass(frozen=True)
+class Services:
+    """What routes work with."""
+
+    settings: Settings
+    database: Database
+    files: FileStore
+    auth: Auth
+    log: EventLog
+    data: SceneData
+    snapper: Snapper
+    desk: Desk
+    export_jobs: ExportJobs

@@ -1,0 +1,66 @@
+"""Objects: their sizes and symmetries in metres, their meshes as they were imported."""
+
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from app.importing import import_dataset
+from registration_core import ObjectModel
+from tests.app.live import LiveServer
+from tests.app.rest import sentence
+from tests.app.small_dataset import BLOCK, TOOL, change_json
+
+
+@pytest.fixture
+def objects(operator: httpx.Client) -> list[dict]:
+    return operator.get("/api/objects?dataset_id=1").json()["items"]
+
+
+def test_objects_tell_their_names_and_sizes(objects: list[dict], operator: httpx.Client, demo: Path) -> None:
+    assert [(item["obj_id"], item["name"]) for item in objects] == [(TOOL, "angle tool"), (BLOCK, "block")]
+    for item in objects:
+        model = ObjectModel.load(demo / f"models/obj_{item['obj_id']:06d}.ply", unit="mm")
+        assert item["diameter"] == pytest.approx(model.diameter, rel=1e-3)
+        assert item["symmetries"] == {"discrete": [], "continuous": []}
+        assert operator.get(f"/api/objects/{item['id']}").json() == item
+
+
+def test_a_mesh_is_the_bytes_that_were_imported(
+    objects: list[dict], operator: httpx.Client, demo: Path
+) -> None:
+    for item in objects:
+        answer = operator.get(item["mesh_url"])
+        assert answer.status_code == 200
+        assert answer.content == (demo / f"models/obj_{item['obj_id']:06d}.ply").read_bytes()
+
+
+def test_symmetries_are_in_metres(server: LiveServer, operator: httpx.Client, demo_copy: Path) -> None:
+    half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    half_turn[0, 3] = 12.0  # millimetres in BOP
+    entry = {
+        "symmetries_discrete": [half_turn.ravel().tolist()],
+        "symmetries_continuous": [{"axis": [0, 0, 1], "offset": [0, 5, 0]}],
+    }
+    change_json(demo_copy / "models/models_info.json", lambda infos: infos[str(BLOCK)].update(entry))
+    summary = import_dataset(server.services.database, server.services.files, demo_copy, "symmetric")
+    items = operator.get(f"/api/objects?dataset_id={summary.dataset_id}").json()["items"]
+    (block,) = [item for item in items if item["obj_id"] == BLOCK]
+    (discrete,) = block["symmetries"]["discrete"]
+    half_turn[0, 3] = 0.012
+    assert np.allclose(discrete, half_turn)
+    (continuous,) = block["symmetries"]["continuous"]
+    assert np.allclose(continuous["axis"], [0, 0, 1]) and np.allclose(continuous["offset"], [0, 0.005, 0])
+
+
+def test_lists_come_in_pages(operator: httpx.Client, objects: list[dict]) -> None:
+    first = operator.get("/api/objects?dataset_id=1&limit=1").json()
+    second = operator.get(f"/api/objects?dataset_id=1&limit=1&after={first['next']}").json()
+    assert first["items"] + second["items"] == objects
+    assert second["next"] is None
+
+
+@pytest.mark.parametrize("url", ["objects/999", "objects/999/mesh.ply"])
+def test_what_does_not_exist_is_said(operator: httpx.Client, url: str) -> None:
+    assert "no object 999" in sentence(operator.get(f"/api/{url}"), 404)
