@@ -1,0 +1,83 @@
+/** The server's REST interface: JSON in and out, problems as errors, sign-in when the login has ended. */
+
+/** A call that did not succeed; `message` is one sentence for people. `status` is 0 without an answer. */
+export class ApiError extends Error {
+  constructor(status, message) {
+    super(message);
+    this.name = "ApiError";
+    this.status = status;
+  }
+}
+
+export const UNREACHABLE = "The server cannot be reached. Nothing is lost; try again in a moment.";
+
+export const get = (path, params) => request("GET", withQuery(path, params));
+export const post = (path, body) => request("POST", path, body);
+export const put = (path, body) => request("PUT", path, body);
+export const del = (path) => request("DELETE", path);
+
+/** All items of a paged list. */
+export async function getAll(path, params = {}) {
+  const items = [];
+  let after = null;
+  do {
+    const page = await get(path, { ...params, limit: 200, after });
+    items.push(...page.items);
+    after = page.next;
+  } while (after !== null && after !== undefined);
+  return items;
+}
+
+/** The next task for me, or null when there is none. */
+export async function nextTask() {
+  try {
+    return await get("/api/tasks/next");
+  } catch (error) {
+    if (error instanceof ApiError && error.status === 404) return null;
+    throw error;
+  }
+}
+
+/** The sentence to show for a failed answer with the given body text. */
+export function problemSentence(status, text) {
+  try {
+    const { detail, title } = JSON.parse(text);
+    const sentence = [detail, title].find((part) => typeof part === "string" && part !== "");
+    if (sentence) return sentence;
+  } catch {
+    // Not JSON: a proxy or a crash answered instead of the app.
+  }
+  return `The server answered with error ${status}. Nothing was changed.`;
+}
+
+/** Goes to the sign-in page, which comes back here afterwards. */
+export function goToSignIn() {
+  location.assign(`/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`);
+}
+
+function withQuery(path, params = {}) {
+  const isGiven = (value) => value !== null && value !== undefined && value !== "";
+  const given = Object.entries(params).filter(([, value]) => isGiven(value));
+  return given.length ? `${path}?${new URLSearchParams(given)}` : path;
+}
+
+async function request(method, path, body) {
+  const options = { method, headers: { Accept: "application/json" } };
+  if (body !== undefined) {
+    options.headers["Content-Type"] = "application/json";
+    options.body = JSON.stringify(body);
+  }
+  let answer;
+  try {
+    answer = await fetch(path, options);
+  } catch {
+    throw new ApiError(0, UNREACHABLE);
+  }
+  if (answer.status === 401 && location.pathname !== "/sign-in") {
+    goToSignIn();
+    return new Promise(() => {}); // The page is about to go: let nothing after this call run.
+  }
+  const text = await answer.text();
+  if (!answer.ok) throw new ApiError(answer.status, problemSentence(answer.status, text));
+  return text ? JSON.parse(text) : null;
+}

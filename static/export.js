@@ -1,0 +1,153 @@
+/** Export: choose a dataset, start the job, see the gate's verdict, download. */
+
+import { showAccount } from "./account.js";
+import { get, getAll, post } from "./api.js";
+import { byId, element, icon, setText } from "./dom.js";
+import { fileSize } from "./format.js";
+import { messageArea } from "./message.js";
+
+const POLL_MS = 500;
+const STATES = {
+  queued: "Queued",
+  running: "Running",
+  done: "Passed the checks",
+  failed: "Nothing was exported",
+};
+const ENDED = new Set(["done", "failed"]);
+
+const message = messageArea(byId("message"));
+let datasets = [];
+let followed = null;
+
+byId("dataset").addEventListener("change", showContents);
+byId("export-form").addEventListener("submit", start);
+byId("copy").addEventListener("click", copyCurl);
+
+try {
+  const me = await showAccount();
+  if (me.role === "admin") await showPage();
+  else message.show("Exports are made by administrators. Ask one of them for this dataset.");
+} catch (error) {
+  message.problem(error, { label: "Try again", run: () => location.reload() });
+}
+
+async function showPage() {
+  datasets = await getAll("/api/datasets");
+  if (datasets.length === 0) {
+    message.show("There is nothing to export yet. Import a dataset first, on the home page.");
+    return;
+  }
+  byId("dataset").replaceChildren(...datasets.map(({ name, id }) => new Option(name, id)));
+  const asked = new URLSearchParams(location.search).get("dataset_id");
+  if (datasets.some(({ id }) => String(id) === asked)) byId("dataset").value = asked;
+  byId("export-form").hidden = false;
+  showContents();
+  const jobs = await showEarlier();
+  const unfinished = jobs.find(({ state }) => !ENDED.has(state));
+  if (unfinished) await follow(unfinished.id);
+}
+
+function chosen() {
+  return datasets.find(({ id }) => String(id) === byId("dataset").value);
+}
+
+function showContents() {
+  const { scenes, objects, tasks, tasks_submitted: submitted } = chosen();
+  const figures = { "poses submitted": submitted, "tasks still open": tasks - submitted, scenes, objects };
+  byId("contents").replaceChildren(
+    ...Object.entries(figures).map(([name, number]) =>
+      element("div", {}, element("dt", {}, name), element("dd", {}, number.toLocaleString("en"))),
+    ),
+  );
+  byId("nothing").hidden = submitted > 0;
+  byId("start").disabled = submitted === 0;
+}
+
+async function start(event) {
+  event.preventDefault();
+  message.clear();
+  byId("start").disabled = true;
+  try {
+    const { id } = await post("/api/exports", { dataset_id: chosen().id, format: "bop" });
+    await follow(id);
+  } catch (error) {
+    message.problem(error);
+  }
+  showContents();
+}
+
+/** Shows a job until it has ended, or until another one is followed. */
+async function follow(id) {
+  followed = id;
+  while (followed === id) {
+    const job = await get(`/api/exports/${id}`);
+    showJob(job);
+    if (ENDED.has(job.state)) {
+      await showEarlier();
+      return;
+    }
+    await new Promise((resolve) => setTimeout(resolve, POLL_MS));
+  }
+}
+
+function showJob(job) {
+  const ended = ENDED.has(job.state);
+  byId("job").hidden = false;
+  setText(byId("job-title"), jobName(job));
+  if (byId("job-state").dataset.state !== job.state) byId("job-state").replaceChildren(...verdict(job));
+  byId("job-state").dataset.state = job.state;
+  byId("progress").hidden = ended;
+  byId("progress").value = job.progress;
+  setText(byId("job-message"), job.message ?? "");
+  byId("result").hidden = job.state !== "done";
+  if (job.state === "done") showDownload(job);
+}
+
+function showDownload(job) {
+  const url = new URL(job.download_url, location.origin);
+  byId("download").href = url.pathname;
+  setText(byId("download-label"), `Download${job.bytes ? ` · ${fileSize(job.bytes)}` : ""}`);
+  setText(byId("curl"), `curl --fail -OJ -H "Authorization: Bearer $SNAP6D_TOKEN" ${url}`);
+}
+
+async function copyCurl() {
+  try {
+    await navigator.clipboard.writeText(byId("curl").textContent);
+    setText(byId("copy-label"), "Copied");
+  } catch {
+    // The clipboard is closed to pages served over plain http: select the line instead.
+    getSelection().selectAllChildren(byId("curl"));
+    setText(byId("copy-label"), "Selected: copy it");
+  }
+}
+
+/** Shows all exports, the newest first, and returns them. */
+async function showEarlier() {
+  const jobs = (await getAll("/api/exports")).sort((one, other) => other.id - one.id);
+  byId("earlier").hidden = jobs.length === 0;
+  byId("exports").replaceChildren(...jobs.map(jobRow));
+  return jobs;
+}
+
+function jobRow(job) {
+  const verdictCell = element("td", {}, ...verdict(job));
+  if (job.message) verdictCell.append(element("small", {}, job.message));
+  const link = job.download_url ? element("a", { href: job.download_url, download: "" }, "Download") : "";
+  return element(
+    "tr",
+    {},
+    element("td", {}, jobName(job)),
+    verdictCell,
+    element("td", { className: "number" }, job.bytes ? fileSize(job.bytes) : ""),
+    element("td", {}, link),
+  );
+}
+
+function verdict({ state }) {
+  const icons = { queued: "open", running: "in_progress", done: "check", failed: "alert" };
+  return [icon(icons[state]), ` ${STATES[state]}`];
+}
+
+function jobName({ dataset_name: name, format }) {
+  return `${name} · ${format.toUpperCase()}`;
+}

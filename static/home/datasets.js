@@ -1,0 +1,55 @@
+/** The datasets with their progress; pressing one shows only its tasks. */
+
+import { getAll } from "../api.js";
+import { byId, element } from "../dom.js";
+import { count } from "../format.js";
+
+/** Shows all datasets and returns them. `choose(id or null)` is called when one is pressed. */
+export async function showDatasets({ selected, choose, openImport }) {
+  const datasets = await getAll("/api/datasets");
+  const buttons = datasets.map((dataset) => datasetButton(dataset));
+
+  const press = (id) => {
+    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.datasetId === String(id));
+  };
+  for (const button of buttons) {
+    button.addEventListener("click", () => {
+      const id = button.getAttribute("aria-pressed") === "true" ? null : button.dataset.datasetId;
+      press(id);
+      choose(id);
+    });
+  }
+  press(selected);
+  byId("datasets").replaceChildren(...(buttons.length ? buttons : [nothingImported(openImport)]));
+  return datasets;
+}
+
+function datasetButton({ id, name, scenes, objects, tasks, tasks_submitted: submitted }) {
+  const button = element("button", { type: "button", className: "dataset", "data-dataset-id": id });
+  const most = Math.max(tasks, 1);
+  button.append(
+    element(
+      "span",
+      { className: "dataset-head" },
+      element("span", { className: "dataset-name" }, name),
+      element("span", { className: "dataset-done" }, tasks ? `${submitted} of ${tasks}` : "no tasks"),
+    ),
+    element("progress", { className: "human", max: most, value: submitted, "aria-label": "Submitted" }),
+    element("small", {}, `${count(scenes, "scene")} · ${count(objects, "object")}`),
+  );
+  return button;
+}
+
+function nothingImported(openImport) {
+  const box = element("div", { className: "panel empty small" });
+  if (openImport) {
+    const props = { type: "button", className: "button human", onclick: openImport };
+    box.append(
+      element("p", {}, "Nothing here yet. Import a dataset in BOP layout to begin."),
+      element("button", props, "Import a dataset"),
+    );
+  } else {
+    box.append(element("p", {}, "Nothing here yet. An administrator has to import a dataset first."));
+  }
+  return box;
+}

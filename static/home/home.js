@@ -1,0 +1,54 @@
+/** Home: the next task, the datasets and the tasks, with import and "add tasks" for administrators. */
+
+import { showAccount } from "../account.js";
+import { byId } from "../dom.js";
+import { count } from "../format.js";
+import { messageArea } from "../message.js";
+import { setUpAddTasks } from "./add-tasks.js";
+import { showDatasets } from "./datasets.js";
+import { setUpImport } from "./import.js";
+import { showNextTask } from "./next-task.js";
+import { setUpTasks } from "./tasks.js";
+
+const message = messageArea(byId("message"));
+
+try {
+  await showHome(await showAccount());
+} catch (error) {
+  message.problem(error, { label: "Try again", run: () => location.reload() });
+}
+
+async function showHome(me) {
+  const isAdmin = me.role === "admin";
+  for (const node of document.querySelectorAll(".admin-only")) node.hidden = !isAdmin;
+
+  const openAddTasks = () => addTasks.open(tasks.filter);
+  const tasks = setUpTasks({ me, openAddTasks: isAdmin ? openAddTasks : null, onProblem: message.problem });
+  const importDialog = setUpImport((dataset) => {
+    message.show(importedSentence(dataset), "good");
+    return showAll(dataset.id);
+  });
+  const addTasks = setUpAddTasks((added) => {
+    message.show(`${count(added, "task")} added.`, "good");
+    return showAll(tasks.filter.dataset_id);
+  });
+  byId("open-import").addEventListener("click", importDialog.open);
+  byId("open-add-tasks").addEventListener("click", openAddTasks);
+
+  async function showAll(datasetId) {
+    const chooseDataset = (id) => tasks.chooseDataset(id).catch(message.problem);
+    const openImport = isAdmin ? importDialog.open : null;
+    const datasets = await showDatasets({ selected: datasetId, choose: chooseDataset, openImport });
+    tasks.setDatasets(datasets);
+    byId("open-add-tasks").hidden = !isAdmin || datasets.length === 0;
+    await Promise.all([showNextTask(datasets), tasks.chooseDataset(datasetId)]);
+  }
+
+  await showAll(tasks.filter.dataset_id);
+}
+
+function importedSentence({ name, scenes, objects, tasks }) {
+  const next = tasks > 0 ? "" : " It has no ground truth to make tasks from: add tasks yourself.";
+  const numbers = [count(scenes, "scene"), count(objects, "object"), count(tasks, "task")];
+  return `Imported ${name}: ${numbers.join(", ")}.${next}`;
+}

@@ -1,0 +1,49 @@
+/** Keys that work wherever the focus is, in this page and in the iframe of the 3-D view. */
+
+/**
+ * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}.
+ *
+ * "Mod" is Ctrl or Cmd. viser takes W A S D Q E and the arrows for its camera, so no binding may.
+ */
+export function keyBindings(bindings) {
+  const byChord = new Map(bindings.flatMap((binding) => binding.keys.map((key) => [key, binding])));
+
+  function onKeyDown(event) {
+    const binding = byChord.get(chord(event));
+    if (!binding || belongsToControl(event) || document.querySelector("dialog[open]")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (!event.repeat || binding.repeats) binding.run();
+  }
+
+  return (target) => target.addEventListener("keydown", onKeyDown, { capture: true });
+}
+
+/** "Mod+Shift+Z", "Space", "?": Shift is named only where it does not already change the character. */
+export function chord(event) {
+  const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toUpperCase() : event.key;
+  const letterOrNamed = /^[A-Z]$|^..+$/.test(key);
+  const parts = [
+    (event.ctrlKey || event.metaKey) && "Mod",
+    event.altKey && "Alt",
+    event.shiftKey && letterOrNamed && "Shift",
+    key,
+  ];
+  return parts.filter(Boolean).join("+");
+}
+
+/** Typing stays typing, and Space or Enter on a focused button press that button. */
+function belongsToControl(event) {
+  const target = event.composedPath()[0];
+  if (!target?.closest) return false;
+  if (target.closest("input, textarea, select, [contenteditable]")) return true;
+  return (event.key === " " || event.key === "Enter") && target.closest("button, a, summary") !== null;
+}
+
+/** Gives the focus back after a press by mouse, so that the next Space is a snap and not the same button. */
+export function releaseFocusAfterPointer(root) {
+  root.addEventListener("click", (event) => {
+    const byPointer = event.detail > 0;
+    if (byPointer) event.target.closest("button")?.blur();
+  });
+}

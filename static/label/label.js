@@ -1,0 +1,198 @@
+/** The labelling page: joins the 3-D view, the panel, the keys and the server. */
+
+import { del, get, post, put } from "../api.js";
+import { byId, setText } from "../dom.js";
+import { messageArea } from "../message.js";
+import { setUpHelp } from "./help.js";
+import { setUpImage } from "./image.js";
+import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
+import { showNext } from "./next.js";
+import { drawPanel, isSnapping, possible } from "./panel.js";
+import { followRegistration } from "./stream.js";
+import { closeView, focusView, openView } from "./view.js";
+
+const taskId = location.pathname.split("/").filter(Boolean).at(-1);
+const message = messageArea(byId("message"));
+const pending = new Set();
+let task = null;
+let registration = null;
+let snapRequest = null;
+let connected = true;
+let image = null;
+
+const ACTIONS = {
+  snap: requestSnap,
+  cancel: async () => del(`/api/snaps/${registration.snap.id ?? (await snapRequest).id}`),
+  undo: () => post(path("undo")),
+  redo: () => post(path("redo")),
+  reset: () => post(path("reset")),
+  submit: () => post(path("submit")),
+  "offer-accept": () => post(path("accept")),
+  "offer-dismiss": () => post(path("dismiss")),
+};
+
+const BINDINGS = [
+  { keys: ["Space"], does: "Snap", run: () => act("snap") },
+  { keys: ["Escape"], does: "Cancel the snap", run: () => act("cancel") },
+  { keys: ["Y"], does: "Accept the machine's offer", run: () => act("offer-accept") },
+  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss") },
+  { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
+  { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
+  { keys: [","], does: "Previous frame", run: () => stepFrame(-1) },
+  { keys: ["."], does: "Next frame", run: () => stepFrame(+1) },
+  { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
+  { keys: ["?"], does: "Show these keys", run: () => openHelp() },
+];
+const openHelp = setUpHelp(BINDINGS);
+const attachKeys = keyBindings(BINDINGS);
+
+attachKeys(window);
+releaseFocusAfterPointer(document);
+for (const id of Object.keys(ACTIONS)) byId(id).addEventListener("click", () => act(id));
+byId("frame-previous").addEventListener("click", () => stepFrame(-1));
+byId("frame-next").addEventListener("click", () => stepFrame(+1));
+byId("closed-retry").addEventListener("click", () => location.reload());
+
+try {
+  await openTask();
+} catch (error) {
+  showRefused(error);
+}
+
+async function openTask() {
+  const start = () => post(`/api/tasks/${taskId}/registration`);
+  const [started, described] = await Promise.all([start(), get(`/api/tasks/${taskId}`)]);
+  task = described;
+  showTask();
+  openView(started.view_url, attachKeys);
+  const [scene, object] = await Promise.all([
+    get(`/api/scenes/${task.scene.id}`),
+    get(`/api/objects/${task.object.id}`),
+  ]);
+  image = setUpImage(scene, object.diameter);
+  show(started);
+  followRegistration(started.id, {
+    resume: start,
+    onRegistration: showFromServer,
+    onLost: showLost,
+    onTakenOver: showTakenOver,
+    onRefused: showRefused,
+  });
+  await showDatasetProgress().catch(message.problem);
+}
+
+function showTask() {
+  const { dataset, scene, object } = task;
+  document.title = `${object.name} · ${scene.label} · Snap6D`;
+  setText(byId("crumb-dataset"), dataset.name);
+  setText(byId("crumb-scene"), scene.label);
+  setText(byId("crumb-object"), object.name);
+  byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
+  byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
+}
+
+async function showDatasetProgress() {
+  const { tasks, tasks_submitted: submitted } = await get(`/api/datasets/${task.dataset.id}`);
+  setText(byId("dataset-progress"), `${submitted} of ${tasks} submitted`);
+}
+
+function showFromServer(received) {
+  connected = true;
+  byId("connection").hidden = true;
+  show(received);
+}
+
+/** Draws a state of the registration: the only place where it changes. */
+function show(received) {
+  const before = registration;
+  registration = received;
+  drawPanel(registration, connected);
+  image.draw(registration);
+  reportSnap(before?.snap, registration.snap);
+  const { message: problem } = registration;
+  if (problem && problem !== before?.message) message.show(problem, "problem");
+  if (registration.state === "submitted" && before?.state !== "submitted") showSubmitted();
+}
+
+function reportSnap(before, snap) {
+  if (!snap || (before?.id === snap.id && before?.state === snap.state)) return;
+  if (snap.state !== "failed") message.clear();
+  else message.show(snap.message, "problem", { label: "Try again", run: () => act("snap") });
+}
+
+async function showSubmitted() {
+  message.clear();
+  await Promise.all([showNext(), showDatasetProgress()]).catch(message.problem);
+}
+
+async function act(name) {
+  if (pending.has(name) || !possible(registration, connected)[name]) return;
+  pending.add(name);
+  try {
+    message.clear();
+    await ACTIONS[name]();
+  } catch (error) {
+    message.problem(error);
+  } finally {
+    pending.delete(name);
+  }
+}
+
+/** Shows the snap as queued at once, so that it can be cancelled before the server has answered. */
+async function requestSnap() {
+  const before = registration.snap;
+  snapRequest = post(path("snaps"), {});
+  show({ ...registration, snap: { id: null, state: "queued", progress: 0, message: null } });
+  try {
+    await snapRequest;
+  } catch (error) {
+    show({ ...registration, snap: before });
+    throw error;
+  }
+}
+
+async function stepFrame(by) {
+  const frameId = image?.step(by) ?? null;
+  if (frameId === null || !connected) return;
+  await put(path("frame"), { frame_id: frameId }).catch(message.problem);
+}
+
+function submitOrGoOn() {
+  if (registration?.state === "submitted") location.assign(byId("next-task").href);
+  else if (registration && isSnapping(registration)) {
+    message.show("A snap is running: wait for it, or cancel it (Esc), and submit then.");
+  } else act("submit");
+}
+
+function showLost() {
+  connected = false;
+  byId("connection").hidden = false;
+  drawPanel(registration, connected);
+  focusView();
+}
+
+function showTakenOver() {
+  connected = false;
+  drawPanel(registration, connected);
+  closeView();
+  const text = "It goes on there, with everything you did here. This tab no longer follows it.";
+  showClosed("This task was opened in another tab", text, "Continue here instead");
+}
+
+function showRefused(error) {
+  showClosed("This task cannot be opened", error.message, "Try again");
+}
+
+function showClosed(title, text, retry) {
+  byId("opening").hidden = true;
+  byId("connection").hidden = true;
+  byId("offer").hidden = true;
+  setText(byId("closed-title"), title);
+  setText(byId("closed-text"), text);
+  setText(byId("closed-retry"), retry);
+  byId("closed").hidden = false;
+}
+
+function path(action) {
+  return `/api/registrations/${registration.id}/${action}`;
+}

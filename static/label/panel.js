@@ -1,0 +1,93 @@
+/** Draws a registration into the panel; knows nothing of the server. */
+
+import { byId, icon, setText } from "../dom.js";
+import { hintFor } from "./hint.js";
+import { poseNumbers } from "./pose.js";
+
+const SNAP_STATUS = {
+  queued: "Waiting for a worker…",
+  running: "Snapping…",
+  cancelled: "Snap cancelled. The pose is as you left it.",
+  failed: "The snap failed.",
+};
+
+export function isSnapping({ snap }) {
+  return snap?.state === "queued" || snap?.state === "running";
+}
+
+/** What can be done now, by action. */
+export function possible(registration, connected) {
+  const open = registration?.state === "open" && connected;
+  return {
+    snap: open,
+    cancel: open && isSnapping(registration),
+    undo: open && registration.can_undo,
+    redo: open && registration.can_redo,
+    reset: open && registration.can_undo,
+    submit: open && !isSnapping(registration) && !registration.dragging,
+    "offer-accept": open && registration.offer !== null,
+    "offer-dismiss": open && registration.offer !== null,
+  };
+}
+
+export function drawPanel(registration, connected) {
+  for (const [id, can] of Object.entries(possible(registration, connected))) byId(id).disabled = !can;
+  drawSaved(registration, connected);
+  drawConfidence(registration);
+  drawPose(registration);
+  drawSnap(registration);
+  drawOffer(registration);
+  setText(byId("hint"), hintFor(registration));
+  byId("submit").hidden = registration.state === "submitted";
+  byId("submitted").hidden = registration.state !== "submitted";
+}
+
+function drawSaved({ dragging }, connected) {
+  byId("saved").dataset.saved = connected && !dragging;
+  setText(byId("saved-text"), !connected ? "offline" : dragging ? "moving…" : "saved");
+}
+
+function drawConfidence({ confidence, can_undo: moved }) {
+  const meter = byId("confidence");
+  const known = confidence !== null;
+  const text = known ? confidence.toFixed(2) : "–";
+  meter.setAttribute("aria-valuenow", confidence ?? 0);
+  meter.setAttribute("aria-valuetext", known ? text : "no estimate of the machine");
+  byId("confidence-fill").style.setProperty("--share", confidence ?? 0);
+  setText(byId("confidence-number"), text);
+
+  const source = known ? "machine" : moved ? "human" : "start";
+  const badge = byId("source");
+  if (badge.dataset.source === source) return;
+  badge.dataset.source = source;
+  const words = { machine: "posed by the machine", human: "posed by hand", start: "start pose" };
+  badge.replaceChildren(icon(source === "start" ? "open" : source), words[source]);
+}
+
+function drawPose({ T_camera_object: T }) {
+  for (const [name, text] of Object.entries(poseNumbers(T))) {
+    setText(document.querySelector(`[data-pose=${name}]`), text);
+  }
+}
+
+function drawSnap(registration) {
+  const { snap } = registration;
+  const bar = byId("progress");
+  const running = isSnapping(registration);
+  bar.classList.toggle("running", running);
+  if (running && snap.state === "queued") bar.removeAttribute("value");
+  else bar.value = running ? snap.progress : 0;
+  setText(byId("snap-status"), snapStatus(registration));
+}
+
+function snapStatus({ state, snap, offer, confidence }) {
+  if (!snap || state !== "open") return "";
+  if (snap.state !== "done") return SNAP_STATUS[snap.state];
+  if (offer) return "You moved the object meanwhile: the result is offered.";
+  return confidence === null ? "" : `Snapped, confidence ${confidence.toFixed(2)}.`;
+}
+
+function drawOffer({ offer, state }) {
+  byId("offer").hidden = !offer || state !== "open";
+  if (offer) setText(byId("offer-confidence"), offer.confidence.toFixed(2));
+}

@@ -1,0 +1,37 @@
+/** Poses (4x4 nested lists, row-major, metres) as numbers for people: millimetres and degrees. */
+
+const DEGREES = 180 / Math.PI;
+
+/** {x, y, z} in mm and the rotation vector {rx, ry, rz} in degrees, as texts with one decimal. */
+export function poseNumbers(T) {
+  const [x, y, z] = [T[0][3], T[1][3], T[2][3]].map((metres) => oneDecimal(metres * 1000));
+  const [rx, ry, rz] = rotationVector(T).map((radians) => oneDecimal(radians * DEGREES));
+  return { x, y, z, rx, ry, rz };
+}
+
+/** Axis times angle [rad] of the rotation of a pose, by way of its quaternion (sound up to half a turn). */
+export function rotationVector(T) {
+  const [w, ...axis] = quaternion(T);
+  const sine = Math.hypot(...axis);
+  if (sine < 1e-12) return [0, 0, 0];
+  const angle = 2 * Math.atan2(sine, w);
+  return axis.map((component) => (component / sine) * angle);
+}
+
+/** Unit quaternion [w, x, y, z], w >= 0, from the largest of its four components. */
+function quaternion([[a, b, c], [d, e, f], [g, h, i]]) {
+  const candidates = [
+    [1 + a + e + i, h - f, c - g, d - b],
+    [h - f, 1 + a - e - i, b + d, c + g],
+    [c - g, b + d, 1 - a + e - i, f + h],
+    [d - b, c + g, f + h, 1 - a - e + i],
+  ];
+  const best = candidates.reduce((one, other) => (Math.hypot(...other) > Math.hypot(...one) ? other : one));
+  const scale = (best[0] < 0 ? -1 : 1) / Math.hypot(...best);
+  return best.map((component) => component * scale);
+}
+
+function oneDecimal(number) {
+  const text = number.toFixed(1);
+  return text === "-0.0" ? "0.0" : text;
+}
