@@ -1,0 +1,100 @@
+"""Where the gizmo's handles are on the screen, and how to drag one with the mouse.
+
+The numbers are those of viser's gizmo; pixel positions come from the hook that viser keeps for its own tests.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from playwright.sync_api import Frame, Page
+
+GIZMO = "/object"
+AXES = {"x": 0, "y": 1, "z": 2}
+ARROW, PLANE, ARC = 0.9, 0.255, 0.65
+"""Where arrows, squares and arcs are grasped, as shares of the gizmo's scale."""
+
+PIXEL = """([name, local]) => {
+  const viser = window.__viserMutable, node = viser.nodeRefFromName[name];
+  node.updateWorldMatrix(true, false);
+  viser.camera.updateMatrixWorld();
+  const at = node.position.clone().set(...local).applyMatrix4(node.matrixWorld).project(viser.camera);
+  const box = viser.canvas.getBoundingClientRect();
+  return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
+}"""
+
+STANDS_STILL = """() => new Promise(done => {
+  let still = 0, last = "";
+  const timer = setInterval(() => {
+    document.querySelectorAll(".mantine-Notification-closeButton").forEach(button => button.click());
+    const now = window.__viserMutable.camera.matrixWorld.elements.map(x => x.toFixed(4)).join();
+    still = now === last ? still + 1 : 0;
+    last = now;
+    if (still > 5) { clearInterval(timer); done(); }
+  }, 100);
+})"""
+"""Resolves when the camera no longer moves; closes the notice on software rendering, which swallows drags."""
+
+
+@dataclass(frozen=True)
+class Handle:
+    """A part of the gizmo to take hold of: "tx" an arrow, "pxy" a square, "rz" an arc."""
+
+    name: str
+    scale: float
+    """The gizmo's scale, metres."""
+
+    @property
+    def grip(self) -> np.ndarray:
+        """Where it is grasped (3,), in the gizmo's frame."""
+        kind, axes = self.name[0], [AXES[axis] for axis in self.name[1:]]
+        unit = np.eye(3)
+        if kind == "t":
+            return ARROW * self.scale * unit[axes[0]]
+        if kind == "p":
+            return PLANE * self.scale * (unit[axes[0]] + unit[axes[1]])
+        first, second = (axis for axis in range(3) if axis != axes[0])
+        return ARC * self.scale * (unit[first] + unit[second]) / np.sqrt(2)
+
+    def moved_grip(self, amount: float) -> np.ndarray:
+        """Where the grip is after moving the handle by `amount` metres or radians."""
+        axes = [AXES[axis] for axis in self.name[1:]]
+        unit = np.eye(3)
+        if self.name[0] == "r":
+            axis = unit[axes[0]]
+            along = axis * (axis @ self.grip)
+            across = self.grip - along
+            return along + np.cos(amount) * across + np.sin(amount) * np.cross(axis, across)
+        return self.grip + amount * sum(unit[axis] for axis in axes)
+
+
+def view_frame(page: Page) -> Frame:
+    """The 3-D view's document, when its scene is there and the camera stands still."""
+    element = page.wait_for_selector("#view")
+    assert element is not None
+    frame = element.content_frame()
+    assert frame is not None
+    frame.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name]", arg=GIZMO)
+    frame.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name]", arg="/cloud")
+    frame.evaluate(STANDS_STILL)
+    return frame
+
+
+def pixel(page: Page, frame: Frame, local: np.ndarray) -> np.ndarray:
+    """The page's pixel (2,) of a point in the gizmo's frame."""
+    element = frame.frame_element().bounding_box()
+    assert element is not None
+    inside = frame.evaluate(PIXEL, [GIZMO, local.tolist()])
+    return np.array([inside[0] + element["x"], inside[1] + element["y"]])
+
+
+def drag(page: Page, frame: Frame, handle: Handle, amount: float, steps: int = 6) -> None:
+    """Drag a handle by `amount` metres or radians with the mouse."""
+    start = pixel(page, frame, handle.grip)
+    end = pixel(page, frame, handle.moved_grip(amount))
+    page.mouse.move(*(start - 2))
+    page.mouse.move(*start)
+    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    page.mouse.down()
+    for step in range(1, steps + 1):
+        page.mouse.move(*(start + (end - start) * step / steps))
+    page.mouse.up()

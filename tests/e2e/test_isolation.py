@@ -1,0 +1,80 @@
+"""Two people at once, and what listens on the network."""
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.e2e.conftest import Server, descendants, start_server
+from tests.e2e.test_labelling import Desk
+
+pytestmark = pytest.mark.e2e
+
+
+def test_two_operators_do_not_reach_each_other(server: Server, open_page: Callable[[str], Page]) -> None:
+    ann = Desk(open_page(server.new_link("ann")), server)
+    bob = Desk(open_page(server.new_link("bob")), server)
+    assert ann.url != bob.url
+    assert ann.page.request.get(bob.url).status == 404
+    assert ann.page.request.put(f"{bob.url}/pose", data={"T_world_object": []}).status in {404, 422}
+    bobs_view = bob.page.locator("#view").get_attribute("src")
+    assert bobs_view is not None
+    view_path = bobs_view.split("?")[0]
+    assert ann.page.request.get(f"{server.url}{view_path}").status == 404
+    opened = ann.page.evaluate(
+        """path => new Promise(done => {
+          const socket = new WebSocket(location.origin.replace("http", "ws") + path, "viser-v1.1.1");
+          socket.onopen = () => done("opened");
+          socket.onclose = event => done("refused");
+        })""",
+        view_path,
+    )
+    assert opened == "refused"
+
+
+def test_only_the_public_port_listens_beyond_loopback(
+    tmp_path: Path, open_page: Callable[[str], Page]
+) -> None:
+    running = start_server(tmp_path / "state", "--prepare", "--host", "0.0.0.0")
+    try:
+        desk = Desk(open_page(running.sign_in_link), running)  # a view and its viser server are up
+        expect(desk.page.locator("#snap")).to_be_enabled()
+        public = {port for address, port in listening(running.process.pid) if address != "127.0.0.1"}
+        assert public == {int(running.url.rsplit(":", 1)[1])}
+        assert len(listening(running.process.pid)) > 3  # scheduler, workers and the view, all on the loopback
+    finally:
+        running.stop()
+
+
+def listening(pid: int) -> set[tuple[str, int]]:
+    """Addresses and ports that a process and its children listen on."""
+    sockets = set()
+    for process in {pid, *descendants(pid)}:
+        for link in Path(f"/proc/{process}/fd").iterdir():
+            try:
+                if match := re.fullmatch(r"socket:\[(\d+)\]", os.readlink(link)):
+                    sockets.add(match[1])
+            except FileNotFoundError:
+                continue
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and fields[9] in sockets:
+                address, port = fields[1].split(":")
+                dotted = ".".join(str(int(address[i : i + 2], 16)) for i in (6, 4, 2, 0))
+                found.add((dotted if table == "tcp" else address, int(port, 16)))
+    return found
+
+
+def test_a_foreign_page_cannot_act(server: Server, open_page: Callable[[str], Page]) -> None:
+    page = open_page(server.new_link("carl"))
+    page.wait_for_url(f"{server.url}/")
+    answer = page.request.post(
+        f"{server.url}/api/tasks/1/registration", headers={"origin": "http://evil.example"}
+    )
+    assert answer.status == 403
+    assert "foreign" in answer.json()["detail"]

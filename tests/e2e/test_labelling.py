@@ -1,0 +1,231 @@
+"""The labelling page with mouse and keys, on a demo scene."""
+
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from registration_core import pose
+from tests.e2e.conftest import Server, descendants, start_server, take_picture
+from tests.e2e.gizmo import Handle, drag, view_frame
+
+pytestmark = pytest.mark.e2e
+
+SLOW_SNAP = {"preset": "paper", "particle_filter": {"iterations": 20_000, "particles": 50}}
+"""Runs for a long time in small steps."""
+NEXT_PICTURE = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+"""Resolves when the 3-D view has drawn what it knows."""
+
+
+class Desk:
+    """A labelling page and the registration behind it."""
+
+    def __init__(self, page: Page, server: Server, task: int = 0) -> None:
+        self.page = page
+        page.wait_for_url(f"{server.url}/")
+        tasks = page.request.get(f"{server.url}/api/tasks?state=open").json()["items"]
+        self.task = tasks[task]
+        self.page_url = f"{server.url}/label/{self.task['id']}"
+        page.goto(self.page_url)
+        self.frame = view_frame(page)
+        self.root = server.url
+        started = page.request.post(f"{server.url}/api/tasks/{self.task['id']}/registration").json()
+        self.url = f"{server.url}/api/registrations/{started['id']}"
+        item = page.request.get(f"{server.url}/api/objects/{self.task['object']['id']}").json()
+        self.scale = 0.75 * item["diameter"]
+
+    @property
+    def state(self) -> dict:
+        return self.page.request.get(self.url).json()
+
+    @property
+    def pose(self) -> np.ndarray:
+        return np.array(self.state["T_world_object"])
+
+    def events(self, kind: str, count: int = 1) -> list[dict]:
+        """The events of a kind, once there are so many."""
+        deadline = time.monotonic() + 90
+        while time.monotonic() < deadline:
+            items = self.page.request.get(f"{self.url}/events?limit=500").json()["items"]
+            found = [event for event in items if event["kind"] == kind]
+            if len(found) >= count:
+                return found
+            self.page.wait_for_timeout(50)
+        seen = [(event["kind"], event["detail"]) for event in items]
+        raise AssertionError(f"{kind} came {len(found)} times; there is {seen}")
+
+    def wait_for_progress(self) -> None:
+        """Return when a snap is under way in a worker."""
+        deadline = time.monotonic() + 90
+        while not (self.state["snap"] or {"progress": 0})["progress"] > 0:
+            assert time.monotonic() < deadline
+            self.page.wait_for_timeout(50)
+
+    def drag(self, handle: str, amount: float) -> dict:
+        """Drag a handle with the mouse and return the event that was logged."""
+        items = self.page.request.get(f"{self.url}/events?limit=500").json()["items"]
+        before = sum(event["kind"] == "drag" for event in items)
+        drag(self.page, self.frame, Handle(handle, self.scale), amount)
+        event = self.events("drag", before + 1)[-1]
+        self.frame.evaluate(NEXT_PICTURE)
+        return event
+
+
+@pytest.fixture
+def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Desk:
+    """A new operator before a task that nobody has."""
+    name = re.sub(r"\W", "-", request.node.name)[:60]
+    return Desk(open_page(server.new_link(name)), server)
+
+
+def test_every_handle_is_logged_with_its_degrees_of_freedom(desk: Desk) -> None:
+    size = desk.scale
+    for handle, amount, expected in [
+        ("tx", 0.2 * size, {"tx"}),
+        ("rz", 0.2, {"rz"}),
+        ("tz", 0.2 * size, {"tz"}),
+        ("rx", 0.2, {"rx"}),
+        ("pxz", 0.1 * size, {"tx", "tz"}),
+        ("ry", -0.2, {"ry"}),
+        ("ty", -0.2 * size, {"ty"}),
+    ]:
+        event = desk.drag(handle, amount)
+        assert set(event["dof"]) == expected, handle
+        assert event["path"][0][0] == 0.0
+        assert event["duration_seconds"] > 0
+    assert np.allclose(desk.pose, event["T_after"])
+
+
+def test_keys_undo_redo_reset_and_reload(desk: Desk) -> None:
+    page = desk.page
+    start = desk.pose
+    desk.drag("tx", 0.03)
+    moved = desk.pose
+    page.keyboard.press("Control+z")  # the focus is in the 3-D view after a drag
+    desk.events("undo")
+    assert np.allclose(desk.pose, start)
+    page.keyboard.press("Control+Shift+z")
+    desk.events("redo")
+    assert np.allclose(desk.pose, moved)
+    page.locator("#reset").click()
+    desk.events("reset")
+    assert np.allclose(desk.pose, start)
+    page.reload()
+    view_frame(page)
+    expect(page.locator("#undo")).to_be_enabled()
+    page.keyboard.press("Control+z")
+    desk.events("undo", 2)
+    assert np.allclose(desk.pose, moved)
+    page.keyboard.press("?")
+    expect(page.locator("dialog#keys")).to_be_visible()
+    take_picture(page, "label-keys")
+    page.keyboard.press("Escape")
+    expect(page.locator("dialog#keys")).to_be_hidden()
+
+
+def test_snap_with_space_improves_and_can_be_undone(desk: Desk, server: Server) -> None:
+    page = desk.page
+    before = desk.pose
+    page.keyboard.press("Space")
+    (applied,) = desk.events("snap_applied")
+    expect(page.locator("#source")).to_contain_text("machine")
+    assert np.allclose(desk.pose, applied["T_after"])
+    snap = page.request.get(f"{desk.root}/api/snaps/{applied['snap_id']}").json()
+    assert snap["state"] == "done"
+    assert 0 <= snap["estimate"]["confidence"] <= 1
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.allclose(desk.pose, before)
+
+
+def test_a_snap_can_be_cancelled(desk: Desk) -> None:
+    page = desk.page
+    assert page.request.post(f"{desk.url}/snaps", data={"config": SLOW_SNAP}).ok
+    expect(page.locator("#cancel")).to_be_enabled()
+    desk.wait_for_progress()
+    take_picture(page, "label-snap-running")
+    page.locator("#cancel").click()
+    desk.events("snap_cancelled")
+    expect(page.locator("#snap")).to_be_enabled()
+    assert desk.state["snap"]["state"] == "cancelled"
+
+
+def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk) -> None:
+    page = desk.page
+    quick = {"preset": "paper", "particle_filter": {"iterations": 1500, "particles": 50}}
+    assert page.request.post(f"{desk.url}/snaps", data={"config": quick}).ok
+    desk.drag("ty", 0.02)
+    desk.events("snap_offered")
+    mine = desk.pose
+    expect(page.locator("#offer")).to_be_visible()
+    take_picture(page, "label-offer")
+    assert np.allclose(desk.pose, mine)
+    page.keyboard.press("y")
+    (accepted,) = desk.events("accept")
+    assert np.allclose(desk.pose, accepted["T_after"])
+    expect(page.locator("#offer")).to_be_hidden()
+
+
+def test_a_dead_worker_is_told_and_the_next_snap_works(desk: Desk, server: Server) -> None:
+    page = desk.page
+    assert page.request.post(f"{desk.url}/snaps", data={"config": SLOW_SNAP}).ok
+    desk.wait_for_progress()
+    for process in busy_workers(server.process.pid):
+        os.kill(process, signal.SIGKILL)
+    desk.events("snap_failed")
+    expect(page.locator("#message")).to_contain_text("worker died")
+    take_picture(page, "label-worker-died")
+    page.get_by_role("button", name="Try again").click()
+    desk.events("snap_applied")
+    expect(page.locator("#message")).to_be_hidden()
+
+
+def busy_workers(server_pid: int) -> list[int]:
+    """Worker processes below the server, the one that computes among them."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) in descendants(server_pid):
+            command = (entry / "cmdline").read_bytes()
+            if b"spawn_main" in command:
+                found.append(int(entry.name))
+    return found
+
+
+@pytest.fixture
+def own_server(tmp_path: Path) -> Iterator[Server]:
+    """A server of this test's own, to be killed."""
+    running = start_server(tmp_path / "state", "--prepare")
+    yield running
+    if running.process.poll() is None:
+        running.kill()
+
+
+def test_the_page_goes_on_after_the_server_was_killed(
+    own_server: Server, open_page: Callable[[str], Page], tmp_path: Path
+) -> None:
+    desk = Desk(open_page(own_server.sign_in_link), own_server)
+    desk.drag("tx", 0.02)
+    kept = desk.pose
+    own_server.kill()
+    expect(desk.page.locator("#connection")).to_be_visible(timeout=20_000)
+    take_picture(desk.page, "label-connection-lost")
+    port = own_server.url.rsplit(":", 1)[1]
+    again = start_server(own_server.state_dir, "--port", port)
+    try:
+        expect(desk.page.locator("#connection")).to_be_hidden(timeout=30_000)
+        assert np.allclose(desk.pose, kept)
+        desk.frame = view_frame(desk.page)
+        desk.drag("tz", 0.02)
+        assert not np.allclose(desk.pose, kept)
+        desk.page.locator("#undo").click()
+        desk.events("undo")
+        assert np.allclose(desk.pose, kept)
+        assert pose.distance(desk.pose, kept).translation < 1e-9
+    finally:
+        again.stop()
