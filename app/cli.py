@@ -47,6 +47,7 @@ def serve(
     ] = False,
 ) -> None:
     """Start Snap6D and print a link to sign in with."""
+    from app.listening import listen
     from app.snapping import create_snapper
 
     given = {
@@ -58,12 +59,13 @@ def serve(
         "workers": workers,
     }
     settings = _settings(**given)
+    listener = listen(settings)
     settings.state_dir.mkdir(parents=True, exist_ok=True)
     snapper = create_snapper(settings)
     try:
         from app import server  # its imports take seconds, in which the workers start
 
-        server.run(settings, prepare, snapper, console.print)
+        server.run(settings, listener, snapper, prepare, console.print)
     finally:
         snapper.close()
 

@@ -30,6 +30,8 @@ Row = TypeVar("Row", Object, Scene, Frame, Task)
 Progress = Callable[[float, str], None]
 DEFAULT_MODE = "accurate"
 DEFAULT_CONDITION = "snap"
+LONGEST_NAME = 200
+"""Characters of a dataset's name."""
 
 UNREADABLE = (
     zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, zlib.error, lzma.LZMAError
@@ -91,6 +93,11 @@ def import_dataset(
         ValueError: in one sentence, where the folder is not sound, or where it contradicts what was imported
             before under this name.
     """
+    name = name or folder.resolve().name
+    if len(name) > LONGEST_NAME:
+        raise DatasetImportError(
+            f"a dataset's name may have {LONGEST_NAME} characters; this one has {len(name)}; shorten it"
+        )
     source = read_dataset(folder, progress)
     models = {item.obj_id: item.model for item in source.objects}
     worlds = [world for scene in source.scenes for world in _worlds(scene, models)]
@@ -98,7 +105,7 @@ def import_dataset(
         raise DatasetImportError(f"{folder} has no scenes; a scene is a folder such as test/000001")
     stored = _store(files, source)
     with database.write() as session:
-        return _Importer(session, stored, name or source.name).run(source, worlds)
+        return _Importer(session, stored, name).run(source, worlds)
 
 
 def import_archive(

@@ -1,6 +1,5 @@
 """Runs the application on its one port."""
 
-import logging
 import socket
 import threading
 from collections.abc import Callable
@@ -13,7 +12,9 @@ from app.auth import Role
 from app.config import PROJECT, Settings
 from app.database import Database
 from app.importing import import_dataset
+from app.listening import ServeError
 from app.main import create_app, create_services
+from app.memory import keep_large_blocks_apart
 from app.services import Services
 from app.snapping import Snapper
 from app.storage import FileStore
@@ -24,25 +25,28 @@ LOCAL_ADMINISTRATOR = "admin"
 SECONDS_TO_FINISH = 3
 
 
-class ServeError(Exception):
-    """The server cannot start; the message says why and what to do."""
-
-
-def run(settings: Settings, prepare: bool, snapper: Snapper, say: Callable[[str], None]) -> None:
+def run(
+    settings: Settings,
+    listener: socket.socket,
+    snapper: Snapper,
+    prepare: bool,
+    say: Callable[[str], None],
+) -> None:
     """Serve until stopped; when pages can be opened, tell a one-time sign-in link.
 
     Args:
-        settings: Where to listen, and with what.
-        prepare: Update the database, and import the demo scenes where it is empty, before.
+        settings: What to serve with.
+        listener: Where to serve.
         snapper: The workers, which may still be starting.
+        prepare: Update the database, and import the demo scenes where it is empty, before.
         say: Tells the person at the console.
 
     Raises:
-        ServeError: where the port or the workers cannot be had.
+        ServeError: where the workers cannot be had.
         DatabaseError: where the database is not of this version.
     """
+    keep_large_blocks_apart()
     rich.reconfigure(quiet=True)  # or viser announces the private address of every view
-    listener = _listen(settings)
     if prepare:
         prepare_state(settings, say)
     services = create_services(settings, snapper)
@@ -51,6 +55,7 @@ def run(settings: Settings, prepare: bool, snapper: Snapper, say: Callable[[str]
         log_level="warning",
         access_log=False,
         ws_max_size=64 * 2**20,
+        ws_per_message_deflate=False,  # point clouds hardly shrink, and everybody would wait for it
         timeout_graceful_shutdown=SECONDS_TO_FINISH,
     )
     server = _AnnouncingServer(config, lambda: _announce(services, listener, say))
@@ -109,20 +114,3 @@ def _announce(services: Services, listener: socket.socket, say: Callable[[str], 
     port = listener.getsockname()[1]
     say("Snap6D is ready. Open this link to sign in; it works once:")
     say(sign_in_link(services.settings, port, services.auth.create_link(user.id)))
-
-
-def _listen(settings: Settings) -> socket.socket:
-    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((settings.host, settings.port))
-        listener.listen(128)
-    except OSError as error:
-        listener.close()
-        raise ServeError(
-            f"port {settings.port} on {settings.host} cannot be used ({error.strerror});"
-            " stop what uses it, or choose another with --port"
-        ) from error
-    logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
-    return listener

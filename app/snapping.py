@@ -115,7 +115,7 @@ class Snapper:
                 worker_dashboard_address="127.0.0.1:0",
                 memory_limit=0,
                 preload=["app.worker"],
-                silence_logs=logging.ERROR,
+                silence_logs=logging.CRITICAL,
             )
         client = Client(self._cluster or self._scheduler_address, set_as_default=False)
         client.subscribe_topic(self.topic, self._on_report)

@@ -4,6 +4,7 @@ A worker needs no shared files: a job brings the depth it looks at, and an objec
 """
 
 import platform
+import signal
 import time
 from collections import OrderedDict, deque
 from dataclasses import dataclass
@@ -96,8 +97,10 @@ def cancel(snap_id: str) -> None:
     _cancelled.append(snap_id)
 
 
-def dask_setup(_worker: Any) -> None:
+def dask_setup(dask_worker: Any) -> None:
     """Dask preload: load every compiled kernel before the first job comes."""
+    if dask_worker.nanny:  # which ends this process in order when someone presses Ctrl-C
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm_up()
 
 

@@ -1,23 +1,45 @@
 """Datasets: what there is, and taking one in."""
 
+import shutil
 import tempfile
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
 
-from fastapi import APIRouter, File, HTTPException, UploadFile
+from fastapi import APIRouter, HTTPException, Request
+from fastapi.concurrency import run_in_threadpool
 from pydantic import BaseModel
 from sqlalchemy import distinct, func, select
 from sqlalchemy.orm import Session
+from starlette.datastructures import UploadFile
 
 from app.api.dependencies import AdminDep, AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of
 from app.api.problems import InputError
+from app.auth import Identity
 from app.importing import import_archive
+from app.services import Services
 from app.tables import Dataset, Object, Registration, Scene, Task
 
 router = APIRouter(prefix="/api/datasets", tags=["datasets"])
 
 MEGABYTE = 2**20
+UPLOAD_BODY = {
+    "required": True,
+    "content": {
+        "multipart/form-data": {
+            "schema": {
+                "type": "object",
+                "required": ["file"],
+                "properties": {
+                    "file": {
+                        "type": "string",
+                        "format": "binary",
+                        "description": "A zip file with one BOP dataset.",
+                    }
+                },
+            }
+        }
+    },
+}
 
 
 class DatasetOut(BaseModel):
@@ -51,24 +73,35 @@ def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -
         return _out(session, row)
 
 
-@router.post("", status_code=201)
-def upload_dataset(
-    file: Annotated[UploadFile, File(description="A zip file with one BOP dataset.")],
-    services: ServicesDep,
-    identity: AdminDep,
-) -> DatasetOut:
+@router.post("", status_code=201, openapi_extra={"requestBody": UPLOAD_BODY})
+async def upload_dataset(request: Request, services: ServicesDep, identity: AdminDep) -> DatasetOut:
     """Take a BOP dataset in from a zip file; checked whole before anything is kept."""
-    max_bytes = services.settings.max_upload_mb * MEGABYTE
-    if (file.size or 0) > max_bytes:
+    # The body is read here and not by a parameter, so that a stranger's upload is refused unread.
+    _check_length(request, services)
+    async with request.form() as form:
+        file = form.get("file")
+        if not isinstance(file, UploadFile):
+            raise InputError("body.file: Send the zip file in a form field of this name.")
+        return await run_in_threadpool(_take_in, file, services, identity)
+
+
+def _check_length(request: Request, services: Services) -> None:
+    length = request.headers.get("content-length", "")
+    if not length.isdigit():
+        raise HTTPException(411, "An upload must say how long it is: send Content-Length.")
+    if int(length) > services.settings.max_upload_mb * MEGABYTE:
         raise HTTPException(413, f"The upload is larger than {services.settings.max_upload_mb} MB.")
+
+
+def _take_in(file: UploadFile, services: Services, identity: Identity) -> DatasetOut:
     services.settings.state_dir.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=services.settings.state_dir) as folder:
         archive = Path(folder) / "upload.zip"
         with archive.open("wb") as target:
-            while chunk := file.file.read(MEGABYTE):
-                target.write(chunk)
+            shutil.copyfileobj(file.file, target)
         try:
             name = Path(file.filename or "dataset").stem
+            max_bytes = services.settings.max_upload_mb * MEGABYTE
             summary = import_archive(services.database, services.files, archive, name, max_bytes)
         except ValueError as error:
             raise InputError(f"{error}.") from error

@@ -2,12 +2,14 @@
 
 from datetime import timedelta
 from typing import Annotated
+from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Cookie, HTTPException, Request, Response
 from pydantic import BaseModel, Field
 
 from app.api.dependencies import SESSION_COOKIE, IdentityDep, ServicesDep, is_same_origin
 from app.auth import LOGIN_LIFETIME
+from app.services import Services
 
 router = APIRouter(prefix="/api", tags=["sign-in"])
 
@@ -37,14 +39,14 @@ class Me(BaseModel):
 def sign_in(body: Credentials, request: Request, services: ServicesDep) -> Response:
     """Sign in with name and password: sets the login cookie."""
     _refuse_foreign_page(request)
-    return _with_cookie(request, services.auth.sign_in(body.name, body.password), LOGIN_LIFETIME)
+    return _with_cookie(request, services, services.auth.sign_in(body.name, body.password), LOGIN_LIFETIME)
 
 
 @router.post("/sign-in/link", status_code=204)
 def sign_in_with_link(body: Link, request: Request, services: ServicesDep) -> Response:
     """Sign in with a one-time link's secret: sets the login cookie and uses the link up."""
     _refuse_foreign_page(request)
-    return _with_cookie(request, services.auth.sign_in_with_link(body.token), LOGIN_LIFETIME)
+    return _with_cookie(request, services, services.auth.sign_in_with_link(body.token), LOGIN_LIFETIME)
 
 
 @router.post("/sign-out", status_code=204)
@@ -57,7 +59,7 @@ def sign_out(
     _refuse_foreign_page(request)
     if secret:
         services.auth.sign_out(secret)
-    return _with_cookie(request, "", timedelta(0))
+    return _with_cookie(request, services, "", timedelta(0))
 
 
 @router.get("/me")
@@ -71,7 +73,7 @@ def _refuse_foreign_page(request: Request) -> None:
         raise HTTPException(403, "This request came from a foreign page and was refused.")
 
 
-def _with_cookie(request: Request, secret: str, lifetime: timedelta) -> Response:
+def _with_cookie(request: Request, services: Services, secret: str, lifetime: timedelta) -> Response:
     response = Response(status_code=204)
     response.set_cookie(
         SESSION_COOKIE,
@@ -79,6 +81,6 @@ def _with_cookie(request: Request, secret: str, lifetime: timedelta) -> Response
         max_age=int(lifetime.total_seconds()),
         httponly=True,
         samesite="lax",
-        secure=request.url.scheme == "https",
+        secure="https" in {request.url.scheme, urlsplit(services.settings.public_url).scheme},
     )
     return response

@@ -1,6 +1,6 @@
 """Snaps: asking for one, how it stands, and cancelling it."""
 
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
@@ -89,9 +89,9 @@ def request_snap(seat: SeatDep, identity: IdentityDep, body: NewSnap | None = No
 @router.get("/snaps/{snap_id}")
 def get_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> SnapDetail:
     """How a snap stands, with its estimate when it is done."""
-    events = _events(services, identity, snap_id)
-    registration_id = events[0].registration_id
-    outcome = next((event for event in events if event.kind in OUTCOMES), None)
+    registration_id = _events(services, identity, snap_id)[0].registration_id
+    live = services.desk.live_snap(registration_id)  # before the log: how this one ended is there by now
+    outcome = next((event for event in services.log.snap_events(snap_id) if event.kind in OUTCOMES), None)
     if outcome is not None:
         estimate = services.log.estimate(snap_id)
         return SnapDetail(
@@ -102,9 +102,8 @@ def get_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> Snap
             message=outcome.detail.get("message"),
             estimate=_estimate_out(estimate) if estimate else None,
         )
-    live = services.desk.live_snap(registration_id)
     if live is not None and live.id == snap_id:
-        state: SnapState = "running" if live.state == "running" else "queued"
+        state = cast(SnapState, live.state)  # "failed" where the outcome could not be saved
         return _without_outcome(snap_id, registration_id, state, live.progress, live.message)
     return _without_outcome(snap_id, registration_id, "failed", 0.0, INTERRUPTED)
 

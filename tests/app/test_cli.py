@@ -18,7 +18,6 @@ from app.storage import FileStore
 from tests.app.export.site import make_site
 from tests.app.processes import failure, run_snap6d
 
-
 Command = Callable[..., CompletedProcess[str]]
 
 
@@ -138,8 +137,8 @@ def test_a_newer_database_is_said(snap6d, state):
     connection.commit()
     connection.close()
     for run, command in (
-        (snap6d, ["serve", "--port", "0"]),
         (snap6d, ["migrate"]),
+        (run_snap6d, ["serve", "--port", "0"]),
         (run_snap6d, ["serve", "--port", "0", "--prepare"]),
     ):
         message = failure(run(state, *command))

@@ -419,3 +419,10 @@ def test_an_unsound_dataset_in_an_archive_leaves_nothing(database, files, demo_c
     with pytest.raises(ValueError, match="names no image"):
         import_archive(database, files, archive, "upload", MEGABYTES)
     assert everything(database, files) == before
+
+
+def test_a_name_that_is_too_long_is_refused(database, files, demo):
+    before = everything(database, files)
+    with pytest.raises(ValueError, match="name may have 200 characters; this one has 201"):
+        import_dataset(database, files, demo, name="n" * 201)
+    assert everything(database, files) == before

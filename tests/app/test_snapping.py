@@ -13,6 +13,7 @@ import pytest
 from app.snapping import DIED, UNREACHABLE, SnapError, Snapper
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, SnapConfig, region_of_interest
+from tests.app.export.site import CAMERA
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import (
     DEPTH,
@@ -24,7 +25,6 @@ from tests.app.snap_jobs import (
     new_job,
     new_model,
 )
-from tests.app.export.site import CAMERA
 from tests.app.waiting import LONGEST, wait_until
 
 SLOW = SnapConfig.from_dict(SLOW_SNAP)

@@ -34,8 +34,8 @@ def test_all_of_it_is_in_view():
     rendered = render_depth(MODEL, CAMERA, pose.inverse(NEAR_VIEW) @ T)
     rows, columns = np.nonzero(rendered)
     assert len(rows) > 300
-    assert 0 < rows.min() and rows.max() < CAMERA.height - 1
-    assert 0 < columns.min() and columns.max() < CAMERA.width - 1
+    assert rows.min() > 0 and rows.max() < CAMERA.height - 1
+    assert columns.min() > 0 and columns.max() < CAMERA.width - 1
 
 
 def test_its_axes_do_not_hide_each_other():

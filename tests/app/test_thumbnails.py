@@ -33,7 +33,7 @@ def test_the_object_fills_its_picture_but_is_not_cut():
         picture = object_picture(model, 96)
         inside = (picture != INSET_BACKGROUND).any(axis=-1)
         rows, columns = np.nonzero(inside)
-        assert 1 <= rows.min() and rows.max() <= 94 and 1 <= columns.min() and columns.max() <= 94
+        assert rows.min() >= 1 and rows.max() <= 94 and columns.min() >= 1 and columns.max() <= 94
         assert max(np.ptp(rows), np.ptp(columns)) > 60
         assert len(np.unique(picture[inside][:, 0])) > 2  # shaded: its faces can be told apart
 

@@ -26,11 +26,13 @@ NEXT_PICTURE = "() => new Promise(done => requestAnimationFrame(() => requestAni
 class Desk:
     """A labelling page and the registration behind it."""
 
-    def __init__(self, page: Page, server: Server, task: int = 0) -> None:
+    def __init__(self, page: Page, server: Server, object_name: str = "") -> None:
+        """Open the first task that nobody has, or that of an object in the first demo scene."""
         self.page = page
         page.wait_for_url(f"{server.url}/")
-        tasks = page.request.get(f"{server.url}/api/tasks?state=open").json()["items"]
-        self.task = tasks[task]
+        wanted = "scene_id=1" if object_name else "state=open"
+        tasks = page.request.get(f"{server.url}/api/tasks?{wanted}").json()["items"]
+        self.task = next(task for task in tasks if object_name in task["object"]["name"])
         self.page_url = f"{server.url}/label/{self.task['id']}"
         page.goto(self.page_url)
         self.frame = view_frame(page)

@@ -37,7 +37,7 @@ def test_first_registration(server: Server, open_page: Callable[[str], Page]) ->
     page.wait_for_url(f"{server.url}/")
     expect(page.get_by_role("button", name="Import")).to_be_visible()
     take_picture(page, "home")
-    desk = Desk(page, server, task=1)
+    desk = Desk(page, server, "mug")
     assert desk.task["scene"]["label"] == "scene 1"
     take_picture(page, "label-first-sight")
 

@@ -15,6 +15,7 @@ from app.scene_data import camera_of
 from app.tables import Object
 from registration_core import SnapConfig, pose, snap
 from registration_core.pose_error import adi
+from tests.app.api.test_problems import full_disk
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
 from tests.app.rest import SLOW_SNAP, begin, finished_snap, kinds, log_of, sentence
@@ -233,3 +234,19 @@ def test_a_snap_that_the_server_left_unfinished_has_failed(
         state = client.get(url_of(near)).json()
         assert np.allclose(state["T_world_object"], NEAR) and state["snap"] is None
         assert finished_snap(client, request_snap(client, near))["state"] == "done"
+
+
+def test_a_result_that_could_not_be_saved_has_failed(own_live: LiveServer) -> None:
+    script = own_live.script("robot")
+    registration = begin(script)
+    url = f"/api/registrations/{registration['id']}"
+    config = SLOW_SNAP | {"particle_filter": {"iterations": 400, "particles": 50}}
+    snap_id = script.post(f"{url}/snaps", json={"config": config}).json()["id"]
+    with full_disk(own_live):
+        snap = finished_snap(script, snap_id)
+        assert (snap["state"], snap["estimate"]) == ("failed", None)
+        assert snap["message"].startswith("The result could not be saved")
+        assert script.get(url).json()["T_world_object"] == registration["T_world_object"]
+    assert kinds(script, registration["id"]) == ["opened", "snap_requested"]
+    again = script.post(f"{url}/snaps").json()["id"]
+    assert finished_snap(script, again)["state"] == "done"

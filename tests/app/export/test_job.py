@@ -109,7 +109,7 @@ def test_a_job_ends_with_a_stored_zip(site: Site) -> None:
     assert run_job(site.database, site.files, export_id)
     row = row_of(site, export_id)
     assert (row.state, row.progress) == ("done", 1.0)
-    assert row.message == "scenes: 2, images: 7, objects: 6"
+    assert row.message == "Scenes: 2, images: 7, annotated objects: 6."
     with zipfile.ZipFile(site.files.path(row.file_hash)) as zipped:
         assert zipped.testzip() is None
         gt = json.loads(zipped.read("Two_boxes_v1/test/000002/scene_gt.json"))

@@ -224,11 +224,11 @@ def test_each_action_is_recorded_before_it_is_seen(kind):
     seen: list[SessionState] = []
     told: list[SessionState] = []
     bench.log.watch = lambda: seen.append(bench.state)
-    bench.session.subscribe(lambda state: told.append(state))
+    bench.session.subscribe(told.append)
     ACTIONS[kind](bench.session)
     assert bench.log.kinds == [kind]
     assert same(seen[0], before)
-    assert told and not same(told[-1], before) or kind == "drag"
+    assert (told and not same(told[-1], before)) or kind == "drag"
 
 
 @pytest.mark.parametrize("kind", ACTIONS)

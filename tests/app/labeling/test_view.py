@@ -156,11 +156,11 @@ def test_a_locked_object_has_no_handles_left(view):
         view.lock_object()
         locked: dict[str, bool] = {}
         while len(locked) < 3:
-            updates = client.wait_for(
+            known = frozenset(locked)
+            locked |= client.wait_for(
                 "SceneNodeUpdateMessage",
-                lambda m: m["name"] == "/object" and not set(m["updates"]) <= set(locked),
+                lambda m, known=known: m["name"] == "/object" and not set(m["updates"]) <= known,
             )["updates"]
-            locked |= updates
     assert locked == {"disable_axes": True, "disable_sliders": True, "disable_rotations": True}
 
 

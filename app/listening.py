@@ -1,0 +1,30 @@
+"""The one public port."""
+
+import socket
+
+from app.config import Settings
+
+
+class ServeError(Exception):
+    """The server cannot start; the message says why and what to do."""
+
+
+def listen(settings: Settings) -> socket.socket:
+    """The socket that the server is to listen on.
+
+    Raises:
+        ServeError: where the address or the port cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in settings.host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((settings.host, settings.port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise ServeError(
+            f"port {settings.port} on {settings.host} cannot be used ({error.strerror});"
+            " stop what uses it, or choose another with --port"
+        ) from error
+    return listener

@@ -1,0 +1,125 @@
+"""A server that is killed loses at most the drag that was not finished."""
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from app.api.dependencies import SESSION_COOKIE
+from registration_core import pose
+from tests.app.export.site import TOOL, mesh_of, model_of
+from tests.app.labeling.viser_client import ViserClient
+from tests.app.processes import ServerProcess, children_of, command_line, serving
+from tests.app.rest import begin, log_of
+from tests.app.waiting import LONGEST, wait_until
+
+T_OBJECT_GIZMO = pose.from_rotation_translation(np.eye(3), model_of(mesh_of(TOOL)).centre)
+
+
+class Operator:
+    """Somebody at a server in a process of its own, with the view open."""
+
+    def __init__(self, server: ServerProcess, view: ViserClient, http: httpx.Client) -> None:
+        self.server = server
+        self.view = view
+        self.http = http
+        self.registration = begin(http)
+        self.url = f"/api/registrations/{self.registration['id']}"
+
+    @property
+    def state(self) -> dict[str, Any]:
+        return self.http.get(self.url).json()
+
+    @property
+    def drags(self) -> list[dict[str, Any]]:
+        return [event for event in log_of(self.http, self.registration["id"]) if event["kind"] == "drag"]
+
+    def drag(self, *way: np.ndarray) -> None:
+        """Drag over poses of the object."""
+        self.view.drag(T @ T_OBJECT_GIZMO for T in way)
+
+    def kill(self) -> None:
+        """Kill the server, as a crash or a power cut would end it; its workers go too."""
+        workers = children_of(self.server.process.pid)
+        self.server.process.send_signal(signal.SIGKILL)
+        assert self.server.process.wait(LONGEST) == -signal.SIGKILL
+        wait_until(lambda: not any(map(command_line, workers)), "the workers to go")
+
+
+@contextmanager
+def working(state_dir: Path, cookie: dict[str, str]) -> Iterator[Operator]:
+    """An operator before the first task; `cookie` is kept from one server to the next."""
+    with serving(state_dir) as server, httpx.Client(base_url=server.url, timeout=LONGEST) as http:
+        http.cookies.update(cookie)
+        if not cookie:
+            assert http.post("/api/sign-in/link", json={"token": server.secret}).status_code == 204
+            cookie.update(http.cookies)
+        registration_id = begin(http)["id"]
+        header = {"cookie": f"{SESSION_COOKIE}={cookie[SESSION_COOKIE]}"}
+        url = f"ws://{server.host}/view/{registration_id}/"
+        with ViserClient(url, header, server.url) as view:
+            yield Operator(server, view, http)
+
+
+@pytest.fixture
+def cookie() -> dict[str, str]:
+    """Of the operator's login, once they have signed in."""
+    return {}
+
+
+def test_killed_between_and_in_mid_drag(state_dir: Path, cookie: dict[str, str]) -> None:
+    with working(state_dir, cookie) as operator:
+        start = np.array(operator.registration["T_world_object"])
+        ends = [start @ pose.exp([0.01 * i, 0, 0, 0, 0, 0]) for i in range(1, 4)]
+        for i, T in enumerate(ends):
+            operator.drag((start + T) / 2 if i == 0 else T, T)
+        wait_until(lambda: len(operator.drags) == 3, "three drags")
+        operator.kill()
+    with working(state_dir, cookie) as operator:
+        drags = operator.drags
+        assert [drag["dof"] for drag in drags] == [["tx"]] * 3
+        assert all(np.allclose(drag["T_after"], T) for drag, T in zip(drags, ends, strict=True))
+        assert np.allclose(operator.state["T_world_object"], ends[2])
+        unfinished = ends[2] @ pose.exp([0, 0, 0.05, 0, 0, 0])
+        operator.view.take()
+        operator.view.move(unfinished @ T_OBJECT_GIZMO)
+        wait_until(
+            lambda: operator.state["dragging"] and np.allclose(operator.state["T_world_object"], unfinished),
+            "a drag under way",
+        )
+        assert not operator.state["saved"]
+        operator.kill()
+    with working(state_dir, cookie) as operator:
+        state = operator.state
+        assert len(operator.drags) == 3 and not state["dragging"] and state["saved"]
+        assert np.allclose(state["T_world_object"], ends[2])
+        for expected in (ends[1], ends[0], start):
+            undone = operator.http.post(f"{operator.url}/undo").json()
+            assert np.allclose(undone["T_world_object"], expected)
+        assert not undone["can_undo"]
+        redone = operator.http.post(f"{operator.url}/redo").json()
+        assert np.allclose(redone["T_world_object"], ends[0])
+
+
+def test_killed_amid_a_flood_of_drags(state_dir: Path, cookie: dict[str, str]) -> None:
+    with working(state_dir, cookie) as operator:
+        start = np.array(operator.registration["T_world_object"])
+        ends = [start @ pose.exp([0, 0.001 * i, 0, 0, 0, 0]) for i in range(1, 401)]
+        for T in ends:
+            operator.drag(T)
+        seen = wait_until(lambda: found if len(found := operator.drags) >= 20 else None, "some drags")
+        operator.kill()
+    with working(state_dir, cookie) as operator:
+        log = log_of(operator.http, operator.registration["id"])
+        assert [event["sequence"] for event in log] == list(range(1, len(log) + 1))
+        drags = operator.drags
+        assert drags[: len(seen)] == seen
+        assert all(np.allclose(drag["T_after"], T) for drag, T in zip(drags, ends, strict=False))
+        assert np.allclose(operator.state["T_world_object"], drags[-1]["T_after"])
+        undone = operator.http.post(f"{operator.url}/undo").json()
+        assert np.allclose(undone["T_world_object"], drags[-1]["T_before"])
