@@ -35,7 +35,8 @@ def true_pose(obj_id: int) -> np.ndarray:
 def test_first_registration(server: Server, open_page: Callable[[str], Page]) -> None:
     page = open_page(server.new_link("lea", "admin"))
     page.wait_for_url(f"{server.url}/")
-    expect(page.get_by_role("button", name="Import")).to_be_visible()
+    expect(page.locator("[data-task-id]").first).to_be_visible()
+    page.wait_for_load_state("networkidle")
     take_picture(page, "home")
     desk = Desk(page, server, "mug")
     assert desk.task["scene"]["label"] == "scene 1"

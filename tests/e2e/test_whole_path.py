@@ -36,6 +36,8 @@ def test_mug_of_frame_0(server: Server, ycbv: Path, open_page: Callable[[str], P
     page.wait_for_url(f"{server.url}/")
     page.get_by_text("ycbv").first.click()
     card = page.locator("[data-task-id]", has_text="frame 0").filter(has_text="025_mug")
+    card.wait_for()
+    page.wait_for_load_state("networkidle")
     take_picture(page, "home-ycbv")
     card.click()
     page.wait_for_url("**/label/*")
