@@ -133,7 +133,7 @@ class Auth:
             if link is None:
                 raise SignInError("this sign-in link was used before or is too old; ask for a new one")
             session.delete(link)
-        return self._issue("session", link.user_id, LOGIN_LIFETIME)
+            return _add_credential(session, "session", link.user_id, LOGIN_LIFETIME)
 
     def sign_out(self, secret: str) -> None:
         """End a login session."""
@@ -165,19 +165,8 @@ class Auth:
         return Identity(user.id, user.name, Role(user.role), actor)
 
     def _issue(self, kind: str, user_id: int, lifetime: timedelta | None, name: str = "") -> str:
-        secret = secrets.token_urlsafe(32)
         with self._database.write() as session:
-            session.execute(delete(Credential).where(Credential.expires_at < utc_now()))
-            session.add(
-                Credential(
-                    kind=kind,
-                    secret_hash=_hashed(secret),
-                    user_id=user_id,
-                    name=name,
-                    expires_at=utc_now() + lifetime if lifetime else None,
-                )
-            )
-        return secret
+            return _add_credential(session, kind, user_id, lifetime, name)
 
 
 class _Throttle:
@@ -223,3 +212,21 @@ def _find_credential(session: Session, kind: str, secret: str) -> Credential | N
     if credential is None or (credential.expires_at is not None and credential.expires_at < utc_now()):
         return None
     return credential
+
+
+def _add_credential(
+    session: Session, kind: str, user_id: int, lifetime: timedelta | None, name: str = ""
+) -> str:
+    """The secret of a new credential; those that have expired are cleared away."""
+    secret = secrets.token_urlsafe(32)
+    session.execute(delete(Credential).where(Credential.expires_at < utc_now()))
+    session.add(
+        Credential(
+            kind=kind,
+            secret_hash=_hashed(secret),
+            user_id=user_id,
+            name=name,
+            expires_at=utc_now() + lifetime if lifetime else None,
+        )
+    )
+    return secret

@@ -21,6 +21,10 @@ logger = logging.getLogger(__name__)
 DISK_FULL = "The disk is full: nothing was saved. Free some space and do it again."
 
 
+DISK_FULL_WORDS = ("disk is full", "No space left on device")
+"""Of SQLite, and of PostgreSQL."""
+
+
 class InputError(ValueError):
     """The request asks for something that cannot be; the message names field and value."""
 
@@ -79,7 +83,7 @@ def install(app: FastAPI) -> None:
 def is_disk_full(error: BaseException) -> bool:
     """Whether an error of the database or the file system means that the disk is full."""
     return (isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}) or (
-        isinstance(error, OperationalError) and "disk is full" in str(error.orig)
+        isinstance(error, OperationalError) and any(words in str(error.orig) for words in DISK_FULL_WORDS)
     )
 
 

@@ -135,8 +135,9 @@ class SceneView:
                 drag.on_start()
                 return
             gizmo = event.target
-            T_world_gizmo = _from_viser(gizmo.position, gizmo.wxyz)
-            drag.on_move(T_world_gizmo @ pose.inverse(self._T_object_gizmo))
+            if np.isfinite([*gizmo.position, *gizmo.wxyz]).all() and gizmo.wxyz.any():
+                T_world_gizmo = _from_viser(gizmo.position, gizmo.wxyz)
+                drag.on_move(T_world_gizmo @ pose.inverse(self._T_object_gizmo))
             if event.phase == "end":
                 drag.on_end()
                 await asyncio.sleep(0)

@@ -179,3 +179,18 @@ def test_a_closed_view_serves_nobody(hand, model):
     view.close()
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.1", port))
+
+
+def test_a_place_that_is_no_number_moves_nothing_and_the_drag_still_ends(view, hand):
+    with connect(view) as client:
+        client.take()
+        client.send(
+            "TransformControlsUpdateMessage",
+            name="/object",
+            owner=client.node("TransformControlsMessage", "/object").get("owner", ""),
+            wxyz=[float("nan")] * 4,
+            position=[0.0, 0.0, float("inf")],
+        )
+        client.let_go()
+        hand.wait_for_ends(1)
+    assert hand.calls == ["start", "end"]
