@@ -16,7 +16,7 @@ from app.database import Database
 from app.importing import import_dataset
 from app.storage import FileStore
 from tests.app.export.site import make_site
-from tests.app.processes import failure, run_snap6d
+from tests.processes import failure, run_snap6d
 
 Command = Callable[..., CompletedProcess[str]]
 

@@ -15,9 +15,9 @@ from app.event_log import EventLog, NewEvent
 from app.export_jobs import DIED, INTERRUPTED, ExportJobs
 from app.storage import FileStore
 from app.tables import Export, Registration, User
-from tests.app.processes import children_of, command_line
 from tests.app.small_dataset import TOOL, true_pose
 from tests.app.waiting import wait_until
+from tests.processes import command_line, descendants
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def export_process(export: Export) -> int:
     """The process that does an export, once there is one."""
 
     def look() -> int | None:
-        for pid in children_of(os.getpid()):
+        for pid in descendants(os.getpid()):
             if command_line(pid)[1:4] == ["-m", "app.export", str(export.id)]:
                 return pid
         return None

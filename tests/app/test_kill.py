@@ -14,9 +14,9 @@ from app.api.dependencies import SESSION_COOKIE
 from registration_core import pose
 from tests.app.export.site import TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import ViserClient
-from tests.app.processes import ServerProcess, children_of, command_line, serving
 from tests.app.rest import begin, log_of
 from tests.app.waiting import LONGEST, wait_until
+from tests.processes import Server, command_line, descendants, serving
 
 T_OBJECT_GIZMO = pose.from_rotation_translation(np.eye(3), model_of(mesh_of(TOOL)).centre)
 
@@ -24,7 +24,7 @@ T_OBJECT_GIZMO = pose.from_rotation_translation(np.eye(3), model_of(mesh_of(TOOL
 class Operator:
     """Somebody at a server in a process of its own, with the view open."""
 
-    def __init__(self, server: ServerProcess, view: ViserClient, http: httpx.Client) -> None:
+    def __init__(self, server: Server, view: ViserClient, http: httpx.Client) -> None:
         self.server = server
         self.view = view
         self.http = http
@@ -45,7 +45,7 @@ class Operator:
 
     def kill(self) -> None:
         """Kill the server, as a crash or a power cut would end it; its workers go too."""
-        workers = children_of(self.server.process.pid)
+        workers = descendants(self.server.process.pid)
         self.server.process.send_signal(signal.SIGKILL)
         assert self.server.process.wait(LONGEST) == -signal.SIGKILL
         wait_until(lambda: not any(map(command_line, workers)), "the workers to go")
@@ -54,7 +54,10 @@ class Operator:
 @contextmanager
 def working(state_dir: Path, cookie: dict[str, str]) -> Iterator[Operator]:
     """An operator before the first task; `cookie` is kept from one server to the next."""
-    with serving(state_dir) as server, httpx.Client(base_url=server.url, timeout=LONGEST) as http:
+    with (
+        serving(state_dir, "--workers", "1") as server,
+        httpx.Client(base_url=server.url, timeout=LONGEST) as http,
+    ):
         http.cookies.update(cookie)
         if not cookie:
             assert http.post("/api/sign-in/link", json={"token": server.secret}).status_code == 204

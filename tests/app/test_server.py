@@ -11,8 +11,8 @@ from app.config import Settings
 from app.database import Database
 from app.server import prepare_state, sign_in_link
 from app.tables import Dataset, Task
-from tests.app.processes import children_of, command_line, failure, run_snap6d, serving
 from tests.app.waiting import LONGEST, wait_until
+from tests.processes import command_line, descendants, failure, run_snap6d, serving
 
 
 @pytest.mark.parametrize(
@@ -74,14 +74,14 @@ def ready(client: httpx.Client) -> dict | None:
 
 
 def test_it_serves_until_it_is_asked_to_stop(state_dir: Path):
-    with serving(state_dir) as server:
+    with serving(state_dir, "--workers", "1") as server:
         assert "works once" in server.printed
         with httpx.Client(base_url=server.url.replace("localhost", "127.0.0.1"), timeout=LONGEST) as client:
             health = wait_until(lambda: ready(client), "workers")
             assert health["workers"] == 1
             assert client.post("/api/sign-in/link", json={"token": server.secret}).status_code == 204
             assert client.get("/api/me").json()["role"] == "admin"
-            children = children_of(server.process.pid)
+            children = descendants(server.process.pid)
             assert children
             with client.stream("GET", "/api/health"):
                 server.process.send_signal(signal.SIGTERM)

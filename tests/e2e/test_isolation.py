@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.conftest import Server, descendants, start_server
 from tests.e2e.test_labelling import Desk
+from tests.processes import Server, descendants, serving
 
 pytestmark = pytest.mark.e2e
 
@@ -38,15 +38,12 @@ def test_two_operators_do_not_reach_each_other(server: Server, open_page: Callab
 def test_only_the_public_port_listens_beyond_loopback(
     tmp_path: Path, open_page: Callable[[str], Page]
 ) -> None:
-    running = start_server(tmp_path / "state", "--prepare", "--host", "0.0.0.0")
-    try:
+    with serving(tmp_path / "state", "--prepare", "--host", "0.0.0.0") as running:
         desk = Desk(open_page(running.sign_in_link), running)  # a view and its viser server are up
         expect(desk.page.locator("#snap")).to_be_enabled()
         public = {port for address, port in listening(running.process.pid) if address != "127.0.0.1"}
         assert public == {int(running.url.rsplit(":", 1)[1])}
         assert len(listening(running.process.pid)) > 3  # scheduler, workers and the view, all on the loopback
-    finally:
-        running.stop()
 
 
 def listening(pid: int) -> set[tuple[str, int]]:

@@ -4,16 +4,16 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from registration_core import pose
-from tests.e2e.conftest import Server, descendants, start_server, take_picture
+from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, drag, view_frame
+from tests.processes import Server, command_line, descendants, serving
 
 pytestmark = pytest.mark.e2e
 
@@ -178,7 +178,7 @@ def test_a_dead_worker_is_told_and_the_next_snap_works(desk: Desk, server: Serve
     page = desk.page
     assert page.request.post(f"{desk.url}/snaps", data={"config": SLOW_SNAP}).ok
     desk.wait_for_progress()
-    for process in busy_workers(server.process.pid):
+    for process in workers_of(server):
         os.kill(process, signal.SIGKILL)
     desk.events("snap_failed")
     expect(page.locator("#message")).to_contain_text("worker died")
@@ -188,38 +188,26 @@ def test_a_dead_worker_is_told_and_the_next_snap_works(desk: Desk, server: Serve
     expect(page.locator("#message")).to_be_hidden()
 
 
-def busy_workers(server_pid: int) -> list[int]:
-    """Worker processes below the server, the one that computes among them."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit() and int(entry.name) in descendants(server_pid):
-            command = (entry / "cmdline").read_bytes()
-            if b"spawn_main" in command:
-                found.append(int(entry.name))
-    return found
-
-
-@pytest.fixture
-def own_server(tmp_path: Path) -> Iterator[Server]:
-    """A server of this test's own, to be killed."""
-    running = start_server(tmp_path / "state", "--prepare")
-    yield running
-    if running.process.poll() is None:
-        running.kill()
+def workers_of(server: Server) -> list[int]:
+    """The processes that compute snaps."""
+    return [
+        pid
+        for pid in descendants(server.process.pid)
+        if any("spawn_main" in word for word in command_line(pid))
+    ]
 
 
 def test_the_page_goes_on_after_the_server_was_killed(
-    own_server: Server, open_page: Callable[[str], Page], tmp_path: Path
+    open_page: Callable[[str], Page], tmp_path: Path
 ) -> None:
-    desk = Desk(open_page(own_server.sign_in_link), own_server)
-    desk.drag("tx", 0.02)
-    kept = desk.pose
-    own_server.kill()
+    with serving(tmp_path / "state", "--prepare") as server:
+        desk = Desk(open_page(server.sign_in_link), server)
+        desk.drag("tx", 0.02)
+        kept = desk.pose
+        server.kill()
     expect(desk.page.locator("#connection")).to_be_visible(timeout=20_000)
     take_picture(desk.page, "label-connection-lost")
-    port = own_server.url.rsplit(":", 1)[1]
-    again = start_server(own_server.state_dir, "--port", port)
-    try:
+    with serving(server.state_dir, "--port", server.url.rsplit(":", 1)[1]):
         expect(desk.page.locator("#connection")).to_be_hidden(timeout=30_000)
         assert np.allclose(desk.pose, kept)
         desk.frame = view_frame(desk.page)
@@ -228,6 +216,3 @@ def test_the_page_goes_on_after_the_server_was_killed(
         desk.page.locator("#undo").click()
         desk.events("undo")
         assert np.allclose(desk.pose, kept)
-        assert pose.distance(desk.pose, kept).translation < 1e-9
-    finally:
-        again.stop()

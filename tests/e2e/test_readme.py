@@ -9,9 +9,10 @@ from playwright.sync_api import Page, expect
 
 from registration_core import pose
 from tests.conftest import REPOSITORY
-from tests.e2e.conftest import Server, take_picture
+from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame
 from tests.e2e.test_labelling import Desk
+from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 

@@ -12,8 +12,9 @@ from playwright.sync_api import Page, expect
 
 from registration_core import ObjectModel, pose
 from registration_core.pose_error import adi
-from tests.e2e.conftest import Server, take_picture
+from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, drag, view_frame
+from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 

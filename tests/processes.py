@@ -1,0 +1,153 @@
+"""Real `snap6d` processes."""
+
+import contextlib
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.config import PROJECT
+from tests.app.waiting import LONGEST
+
+
+def environment(state_dir: Path) -> dict[str, str]:
+    """What a `snap6d` process is started with: nothing of this machine's own settings."""
+    own = {name: value for name, value in os.environ.items() if not name.startswith("SNAP6D_")}
+    return {**own, "SNAP6D_STATE_DIR": str(state_dir), "PYTHONUNBUFFERED": "1"}
+
+
+def run_snap6d(
+    state_dir: Path, *arguments: str, typed: str = "", **variables: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    return subprocess.run(
+        [sys.executable, "-m", "app.cli", *arguments],
+        env=environment(state_dir) | variables,
+        cwd=PROJECT,
+        input=typed,
+        capture_output=True,
+        text=True,
+        timeout=LONGEST,
+        check=False,
+    )
+
+
+def failure(done: subprocess.CompletedProcess[str]) -> str:
+    """The one sentence with which a command failed."""
+    assert done.returncode == 1, done
+    assert done.stderr.startswith("snap6d: ") and done.stderr.count("\n") == 1, done.stderr
+    return done.stderr.removeprefix("snap6d: ").strip()
+
+
+@dataclass(frozen=True)
+class Server:
+    """A running `snap6d serve`."""
+
+    process: subprocess.Popen[str]
+    state_dir: Path
+    url: str
+    secret: str
+    """Of the sign-in link."""
+    printed: str
+
+    @property
+    def host(self) -> str:
+        """As in the Host header."""
+        return self.url.removeprefix("http://")
+
+    @property
+    def sign_in_link(self) -> str:
+        """The one-time link of the local administrator."""
+        return f"{self.url}/sign-in#{self.secret}"
+
+    def new_link(self, name: str, role: str = "operator") -> str:
+        """A one-time sign-in link of a new user."""
+        printed = self.command("user", "add", name, "--role", role)
+        return f"{self.url}/sign-in#{printed.strip().rsplit('#', 1)[1]}"
+
+    def command(self, *arguments: str) -> str:
+        """What a `snap6d` command on the same state prints."""
+        done = run_snap6d(self.state_dir, *arguments)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    def stop(self) -> int:
+        """Ask it to end, wait until it has, and return its exit code."""
+        self.process.terminate()
+        return self._wait()
+
+    def kill(self) -> None:
+        """End it at once, with everything that it started."""
+        for process in descendants(self.process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        self.process.kill()
+        self._wait()
+
+    def _wait(self) -> int:
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+        return self.process.wait(LONGEST)
+
+
+def start_server(state_dir: Path, *arguments: str) -> Server:
+    """Start a server on a free port and wait until it tells its sign-in link."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app.cli", "serve", "--port", "0", *arguments],
+        env=environment(state_dir),
+        cwd=PROJECT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert process.stdout is not None
+    printed = ""
+    for line in process.stdout:
+        printed += line
+        if found := re.search(r"(http://\S+)/sign-in#(\S+)", line):
+            return Server(process, state_dir, found[1], found[2], printed)
+    process.wait(LONGEST)
+    raise AssertionError(f"the server did not start:\n{printed}")
+
+
+@contextmanager
+def serving(state_dir: Path, *arguments: str) -> Iterator[Server]:
+    """A server on a free port; however the block ends, nothing of it is left."""
+    server = start_server(state_dir, *arguments)
+    try:
+        yield server
+    finally:
+        server.kill()
+
+
+def descendants(pid: int) -> set[int]:
+    """Processes that a process started, and those started in turn."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                stat = (entry / "stat").read_text()
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+            parent = int(stat.rsplit(")", 1)[1].split()[1])
+            children.setdefault(parent, []).append(int(entry.name))
+    found: set[int] = set()
+    waiting = [pid]
+    while waiting:
+        for child in children.get(waiting.pop(), []):
+            found.add(child)
+            waiting.append(child)
+    return found
+
+
+def command_line(pid: int) -> Sequence[str]:
+    """What a process was started with; empty where it is gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    except (FileNotFoundError, ProcessLookupError):
+        return []
