@@ -9,16 +9,16 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.degrees_of_freedom import degrees_of_freedom
+from app.labeling.drag import Drag
 from app.labeling.history import History, Step
 from app.labeling.snap_exchange import (
     Offer,
@@ -62,16 +62,6 @@ class SessionState:
     message: str | None
 
 
-@dataclass
-class _Drag:
-    """A drag under way."""
-
-    T_start: Array
-    T_now: Array
-    began: float
-    path: list[list[float]] = field(default_factory=list)
-
-
 class LabelingSession:
     """The state of one registration and the actions on it, safe to call from any thread.
 
@@ -107,7 +97,7 @@ class LabelingSession:
         self._request_snap = request_snap
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
-        self._drag: _Drag | None = None
+        self._drag: Drag | None = None
         self._snap: SnapStatus | None = None
         self._cancel_snap: Callable[[], None] | None = None
         self._offer: Offer | None = None
@@ -157,8 +147,7 @@ class LabelingSession:
         with self._lock:
             if not self._is_open:
                 return
-            T = self._history.current.T_world_object
-            self._drag = _Drag(T, T, time.monotonic(), [[0.0, *_path_row(T)]])
+            self._drag = Drag(self._history.current.T_world_object)
             self._changed()
 
     def drag_to(self, T_world_object: Array) -> None:
@@ -166,9 +155,7 @@ class LabelingSession:
         with self._lock:
             if self._drag is None:
                 return
-            self._drag.T_now = T_world_object
-            seconds = round(time.monotonic() - self._drag.began, 4)
-            self._drag.path.append([seconds, *_path_row(T_world_object)])
+            self._drag.move(T_world_object)
             self._changed()
 
     def end_drag(self) -> None:
@@ -177,18 +164,9 @@ class LabelingSession:
             drag, self._drag = self._drag, None
             if drag is None:
                 return
-            dof = degrees_of_freedom(drag.T_start, drag.T_now, self._pivot)
+            event = drag.event(self._pivot)
             try:
-                if dof:
-                    event = NewEvent(
-                        kind="drag",
-                        actor=Actor.HUMAN,
-                        T_before=drag.T_start.tolist(),
-                        T_after=drag.T_now.tolist(),
-                        dof=dof,
-                        path=drag.path,
-                        duration_seconds=time.monotonic() - drag.began,
-                    )
+                if event is not None:
                     self._push(event, Step(drag.T_now))
             except Exception as error:
                 self._message = f"The last drag could not be saved and was taken back: {error}"
@@ -442,8 +420,3 @@ class LabelingSession:
         state = self.snapshot()
         for listener in tuple(self._listeners):
             listener(state)
-
-
-def _path_row(T: Array) -> list[float]:
-    quaternion = Rotation.from_matrix(T[:3, :3]).as_quat(scalar_first=True)
-    return [round(float(value), 6) for value in (*T[:3, 3], *quaternion)]
