@@ -12,7 +12,17 @@ from sqlalchemy import distinct, func, select
 from sqlalchemy.orm import Session
 from starlette.datastructures import UploadFile
 
-from app.api.dependencies import AdminDep, AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of
+from app.api.dependencies import (
+    AdminDep,
+    AfterDep,
+    Id,
+    IdentityDep,
+    LimitDep,
+    Page,
+    ServicesDep,
+    page_of,
+    row_or_404,
+)
 from app.api.problems import InputError
 from app.auth import Identity
 from app.importing import import_archive
@@ -67,10 +77,7 @@ def list_datasets(
 def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -> DatasetOut:
     """One dataset."""
     with services.database.read() as session:
-        row = session.get(Dataset, dataset_id)
-        if row is None:
-            raise HTTPException(404, f"There is no dataset {dataset_id}.")
-        return _out(session, row)
+        return _out(session, row_or_404(session, Dataset, dataset_id))
 
 
 @router.post("", status_code=201, openapi_extra={"requestBody": UPLOAD_BODY})

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 from sqlalchemy import Select
 from sqlalchemy.orm import Session
+from sqlalchemy.orm.interfaces import ORMOption
 from starlette.requests import HTTPConnection
 
 from app.api.problems import InputError
@@ -103,6 +104,14 @@ def page_of(
     shown = rows[:limit]
     more = len(rows) > limit
     return Page(items=[to_json(row) for row in shown], next=getattr(shown[-1], key.key) if more else None)
+
+
+def row_or_404(session: Session, table: type[Row], row_id: int, *options: ORMOption) -> Row:
+    """The row with this id; 404 where there is none."""
+    row = session.get(table, row_id, options=options)
+    if row is None:
+        raise HTTPException(404, f"There is no {table.__name__.lower()} {row_id}.")
+    return row
 
 
 def rigid_pose(value: Pose, name: str) -> NDArray[np.float64]:

@@ -9,7 +9,17 @@ from pydantic import BaseModel, Field
 from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
-from app.api.dependencies import AdminDep, AfterDep, Id, LimitDep, Page, QueryId, ServicesDep, page_of
+from app.api.dependencies import (
+    AdminDep,
+    AfterDep,
+    Id,
+    LimitDep,
+    Page,
+    QueryId,
+    ServicesDep,
+    page_of,
+    row_or_404,
+)
 from app.api.problems import InputError
 from app.services import Services
 from app.tables import Dataset, Export
@@ -92,10 +102,7 @@ def download(export_id: Id, services: ServicesDep, _identity: AdminDep) -> FileR
 
 def _export(services: Services, export_id: int) -> Export:
     with services.database.read() as session:
-        row = session.get(Export, export_id, options=[joinedload(Export.dataset)])
-    if row is None:
-        raise HTTPException(404, f"There is no export {export_id}.")
-    return row
+        return row_or_404(session, Export, export_id, joinedload(Export.dataset))
 
 
 def _out(services: Services, row: Export) -> ExportOut:

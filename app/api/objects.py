@@ -2,12 +2,22 @@
 
 from typing import Any
 
-from fastapi import APIRouter, HTTPException, Response
+from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel
 from sqlalchemy import select
 
-from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, QueryId, ServicesDep, page_of
+from app.api.dependencies import (
+    AfterDep,
+    Id,
+    IdentityDep,
+    LimitDep,
+    Page,
+    QueryId,
+    ServicesDep,
+    page_of,
+    row_or_404,
+)
 from app.services import Services
 from app.tables import Object
 from registration_core.object_model import read_mesh
@@ -62,10 +72,7 @@ def get_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Re
 
 def _object(services: Services, object_id: int) -> Object:
     with services.database.read() as session:
-        row = session.get(Object, object_id)
-    if row is None:
-        raise HTTPException(404, f"There is no object {object_id}.")
-    return row
+        return row_or_404(session, Object, object_id)
 
 
 def _out(row: Object) -> ObjectOut:

@@ -10,7 +10,17 @@ from pydantic import BaseModel
 from sqlalchemy import select
 from sqlalchemy.orm import selectinload
 
-from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, QueryId, ServicesDep, page_of
+from app.api.dependencies import (
+    AfterDep,
+    Id,
+    IdentityDep,
+    LimitDep,
+    Page,
+    QueryId,
+    ServicesDep,
+    page_of,
+    row_or_404,
+)
 from app.services import Services
 from app.tables import Frame, Pose, Scene
 
@@ -74,10 +84,7 @@ def list_scenes(
 def get_scene(scene_id: Id, services: ServicesDep, _identity: IdentityDep) -> SceneOut:
     """One scene with its frames."""
     with services.database.read() as session:
-        row = session.get(Scene, scene_id)
-        if row is None:
-            raise HTTPException(404, f"There is no scene {scene_id}.")
-        return _scene_out(row)
+        return _scene_out(row_or_404(session, Scene, scene_id))
 
 
 @router.get("/frames/{frame_id}/color.png", response_class=Response)
@@ -104,10 +111,7 @@ def get_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Fi
 
 def _frame(services: Services, frame_id: int) -> Frame:
     with services.database.read() as session:
-        row = session.get(Frame, frame_id)
-    if row is None:
-        raise HTTPException(404, f"There is no frame {frame_id}.")
-    return row
+        return row_or_404(session, Frame, frame_id)
 
 
 def _scene_out(row: Scene) -> SceneOut:
