@@ -47,9 +47,10 @@ class Operator:
         body = {"T_world_object": T_world_object.tolist()}
         await self.call("PUT", f"/api/registrations/{registration_id}/pose", body)
 
-    async def request_snap(self, registration_id: int) -> str:
+    async def request_snap(self, registration_id: int, config: dict[str, Any] | None = None) -> str:
         """Press Snap; returns the snap's id."""
-        snap = await self.call("POST", f"/api/registrations/{registration_id}/snaps", {})
+        body = {"config": config or {}}
+        snap = await self.call("POST", f"/api/registrations/{registration_id}/snaps", body)
         return str(snap["id"])
 
     def stream(self, registration_id: int) -> "Stream":
@@ -110,6 +111,15 @@ class Stream:
         def is_wanted(registration: dict[str, Any]) -> bool:
             snap = registration["snap"]
             return snap is not None and snap["id"] == snap_id and snap["state"] in ENDED
+
+        return await self.until(is_wanted)
+
+    async def until_snap_runs(self, snap_id: str) -> dict[str, Any]:
+        """The registration, as soon as a worker is at this snap."""
+
+        def is_wanted(registration: dict[str, Any]) -> bool:
+            snap = registration["snap"]
+            return snap is not None and snap["id"] == snap_id and snap["progress"] > 0
 
         return await self.until(is_wanted)
 

@@ -15,6 +15,7 @@ from registration_core import pose_error
 
 TITLE = "Snap on the demo scenes: from POST .../snaps to the result on the stream"
 TARGET = Target(0.3)
+CANCEL_TARGET = Target(0.2)
 RIGHT = 0.1
 """Share of the diameter up to which ADD-S is called right."""
 
@@ -48,6 +49,7 @@ async def _measure(server: RunningServer, tasks: int | None, snaps: int) -> list
     rng = np.random.default_rng(0)
     first: dict[int, float] = {}
     later: list[Snapped] = []
+    cancels: list[float] = []
     async with signed_in_operators(server, 1) as (operator,):
         for task in known_tasks(server.state_dir)[:tasks]:
             registration_id = await operator.start(task.id)
@@ -55,12 +57,14 @@ async def _measure(server: RunningServer, tasks: int | None, snaps: int) -> list
                 warm_up = await _snap(operator, stream, registration_id, task, rng)
                 first.setdefault(task.object_id, warm_up.seconds)
                 later += [await _snap(operator, stream, registration_id, task, rng) for _ in range(snaps)]
+                cancels.append(await _cancel(operator, stream, registration_id))
     return [
         *spread(f"Snap to result ({len(later)} snaps)", [one.seconds for one in later], TARGET),
         Figure("Snap to result, worst", percentile([one.seconds for one in later], 100), "s"),
         *spread("of it between the log's lines", [one.server_seconds for one in later]),
         *spread("of it computing", [one.compute_seconds for one in later]),
         *spread("an object's first snap, at once after opening", list(first.values())),
+        *spread("Cancel of a paper() run to cancelled", cancels, CANCEL_TARGET),
         Figure(
             "right poses (ADD-S below a tenth of the diameter)",
             100 * np.mean([s.is_right for s in later]),
@@ -88,6 +92,16 @@ async def _snap(
         compute_seconds=estimate["seconds"],
         is_right=_is_right(task, np.array(estimate["T_world_object"])),
     )
+
+
+async def _cancel(operator: Operator, stream: Stream, registration_id: int) -> float:
+    snap_id = await operator.request_snap(registration_id, {"preset": "paper"})
+    await stream.until_snap_runs(snap_id)
+    began = time.perf_counter()
+    await operator.call("DELETE", f"/api/snaps/{snap_id}")
+    registration = await stream.until_snap_ended(snap_id)
+    assert registration["snap"]["state"] == "cancelled"
+    return time.perf_counter() - began
 
 
 async def _logged_seconds(operator: Operator, registration_id: int, snap_id: str) -> float:
