@@ -1,6 +1,7 @@
 """Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
 
 from registration_core.camera import Intrinsics
+from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
@@ -8,6 +9,7 @@ from registration_core.snap import snap, snap_steps, warm_up
 from registration_core.snap_config import SnapConfig
 
 __all__ = [
+    "Correspondence",
     "Estimate",
     "Hypothesis",
     "Intrinsics",
@@ -15,6 +17,7 @@ __all__ = [
     "SnapConfig",
     "SnapStep",
     "Symmetries",
+    "pose_from_correspondences",
     "region_of_interest",
     "snap",
     "snap_steps",
