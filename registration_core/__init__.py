@@ -7,6 +7,7 @@ from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps, warm_up
 from registration_core.snap_config import SnapConfig
+from registration_core.symmetry_search import SuggestedSymmetry, as_symmetries, find_symmetries
 
 __all__ = [
     "Correspondence",
@@ -16,7 +17,10 @@ __all__ = [
     "ObjectModel",
     "SnapConfig",
     "SnapStep",
+    "SuggestedSymmetry",
     "Symmetries",
+    "as_symmetries",
+    "find_symmetries",
     "pose_from_correspondences",
     "region_of_interest",
     "snap",
