@@ -73,17 +73,30 @@ def pose_from_correspondences(
         raise ValueError("centre must be one point (3,) of finite numbers")
     largest_misfit = LARGEST_MISFIT * click_noise
     _check_distances(on_object, in_camera, largest_misfit)
-    T, _, _ = trimesh.registration.procrustes(on_object, in_camera, reflection=False, scale=False)
+    T = _fit(on_object, in_camera)
+    residuals = _misses(T, on_object, in_camera)
+    if residuals.max() > largest_misfit:  # distances hardly tell a point off the plane of the others
+        if _misses(_fit(on_object, in_camera, reflection=True), on_object, in_camera).max() <= largest_misfit:
+            raise ValueError(
+                "points_camera must not be the mirror image of points_object; check which belongs to which"
+            )
+        raise _misfit(int(residuals.argmax()), float(residuals.max()))
     T = pose.orthonormalised(T)
-    residuals = np.linalg.norm(pose.apply(T, on_object) - in_camera, axis=1)
-    if residuals.max() > largest_misfit:  # all distances agree, so this is what is left
-        raise ValueError(
-            "points_camera must not be the mirror image of points_object; check which point belongs to which"
-        )
     freedom = 3 * len(residuals) - 6
     noise = max(click_noise, float(np.sqrt(np.sum(residuals**2) / freedom)))
     spread = _spread(pose.apply(T, on_object), pose.apply(T, about), noise)
     return Correspondence(T, residuals, float(np.sqrt(np.mean(residuals**2))), spread)
+
+
+def _fit(on_object: Array, in_camera: Array, reflection: bool = False) -> Array:
+    """Transform (4, 4) that brings the points of the object nearest to those in the camera."""
+    T, _, _ = trimesh.registration.procrustes(on_object, in_camera, reflection=reflection, scale=False)
+    return T
+
+
+def _misses(T: Array, on_object: Array, in_camera: Array) -> Array:
+    """Distances (N,) between the points of each pair under T (4, 4), metres."""
+    return np.linalg.norm(pose.apply(T, on_object) - in_camera, axis=1)
 
 
 def _spread(points: Array, centre: Array, noise: float) -> tuple[float, float]:
@@ -135,9 +148,14 @@ def _check_distances(on_object: Array, in_camera: Array, largest: float) -> None
         return
     others = [np.delete(np.delete(differences, i, axis=0), i, axis=1).max() for i in range(len(differences))]
     worst = int(np.lexsort((-differences.sum(axis=1), others))[0])
-    raise ValueError(
-        f"points_camera must match points_object; pair {worst + 1} does not fit the others by"
-        f" {_mm(differences[worst].max())}: click it again"
+    raise _misfit(worst, differences[worst].max())
+
+
+def _misfit(pair: int, by: float) -> ValueError:
+    """What to tell whoever clicked that pair."""
+    return ValueError(
+        f"points_camera must match points_object; pair {pair + 1} does not fit the others by {_mm(by)}:"
+        " click it again"
     )
 
 

@@ -58,7 +58,7 @@ MOST_MINIMA = 20
 LARGEST_MISS = 0.04
 """... where the mean miss is below this, diameters: an axis 4 degrees off a true one misses by less."""
 
-COARSE, FINE, ALL, DENSE = 100, 300, 2000, 10_000
+COARSE, FINE, ALL, DENSE = 100, 200, 2000, 10_000
 """Samples that directions are compared with, axes refined, residuals measured; all stand for the surface."""
 
 STEPS = 6
@@ -248,14 +248,14 @@ def refined(
     for _ in range(STEPS):
         across = np.linalg.svd(axis[None])[2][1:]
         R = axis_rotations(axis, angles[:MOST_ANGLES])
-        back = R.swapaxes(1, 2)
         x = points - origin
-        y = x @ back
+        y = x @ R.swapaxes(1, 2)
         closest, normals = surface.closest(y + origin)
         misses = np.sum(normals * (y + origin - closest), axis=2).ravel()
-        tilts = [np.cross(w, y) - np.cross(w, x) @ back for w in across]
-        shifts = [(v - R @ v)[:, None] for v in across]
-        J = np.stack([np.sum(normals * moved, axis=2).ravel() for moved in (*tilts, *shifts)], axis=1)
+        turned_back = normals @ R
+        tilt = np.cross(y, normals) - np.cross(x, turned_back)
+        shift = normals - turned_back
+        J = np.concatenate([tilt @ across.T, shift @ across.T], axis=2).reshape(-1, 4)
         weighted = J.T / (1.0 + (misses / tolerance) ** 2)
         H = weighted @ J
         step = np.linalg.solve(H + DAMPING * max(np.trace(H), 1.0) * np.eye(4), -weighted @ misses)

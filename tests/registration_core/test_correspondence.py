@@ -170,6 +170,14 @@ def test_a_mirror_image_is_refused() -> None:
         pose_from_correspondences(TETRAHEDRON, TETRAHEDRON * [1.0, 1.0, -1.0])
 
 
+def test_a_click_on_the_background_is_no_mirror_image() -> None:
+    """A corner of a square pushed far out of its plane hardly changes the distances to the other three."""
+    square = np.array([[0.08, 0.08, 0.0], [-0.08, 0.08, 0.0], [-0.08, -0.08, 0.0], [0.08, -0.08, 0.0]])
+    seen = wrong(square, 2, square[2] + [0.0, 0.0, 0.07])
+    with pytest.raises(ValueError, match="pair 3 does not fit the others by 20 mm: click it again"):
+        pose_from_correspondences(square, seen, click_noise=0.003)
+
+
 def test_a_flat_mirror_image_is_turned_over_not_reflected() -> None:
     """Points of one plane fit their mirror image by half a turn."""
     flat = TETRAHEDRON * [1.0, 1.0, 0.0] + [[0, 0, 0], [0, 0, 0], [0, 0, 0], [0.05, 0.05, 0.0]]
