@@ -7,7 +7,8 @@ from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps, warm_up
 from registration_core.snap_config import SnapConfig
-from registration_core.symmetry_search import SuggestedSymmetry, as_symmetries, find_symmetries
+from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
+from registration_core.symmetry_search import find_symmetries
 
 __all__ = [
     "Correspondence",

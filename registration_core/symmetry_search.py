@@ -17,8 +17,16 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from registration_core import pose
-from registration_core.object_model import ContinuousSymmetry, ObjectModel, Symmetries, discrete
+from registration_core.object_model import ObjectModel
+from registration_core.symmetry_group import (
+    SAME_AXIS,
+    SuggestedSymmetry,
+    angles_of,
+    axis_rotations,
+    flips,
+    order,
+    turns,
+)
 
 Array = NDArray[np.float64]
 
@@ -34,17 +42,8 @@ HIGHEST_FOLD = 12
 PRIMES = (2, 3, 5, 7, 11)
 """Each of those axes is also one of such an order."""
 
-TURNS = 2.0 * np.pi * np.modf(np.arange(1, 17) * (np.sqrt(5.0) - 1.0) / 2.0)[0]
-"""Angles that stand for all angles: multiples of the golden one, even over a turn and over its fractions."""
-
-SAME_AXIS = np.radians(6.0)
-"""Axes nearer than this are one; the flips of a 12-fold prism are 15 degrees apart."""
-
-SAME_ROTATION = np.radians(12.0)
-"""Rotations nearer than this are one; those of a 12-fold axis are 30 degrees apart."""
-
-MOST_ROTATIONS = 60
-"""Of a finite group of rotations, as the icosahedron has them."""
+LEAST_AREA = 1e-9
+"""Of a surface, squared diameters: less is rounding."""
 
 PLANE_DIRECTIONS = 60
 """Axes tried in a plane of like spread: 3 degrees apart."""
@@ -69,25 +68,6 @@ MOST_ANGLES = 4
 
 DAMPING = 1e-4
 """Of those steps: about a flip of a cylinder, say, one tilt changes nothing."""
-
-
-@dataclass(frozen=True, eq=False)
-class SuggestedSymmetry:
-    """An axis about which a mesh can be turned onto itself."""
-
-    axis: Array
-    """(3,), unit length, in the mesh frame."""
-    origin: Array
-    """(3,), metres: the point of the axis that is nearest to the centroid of the surface."""
-    fold: int | None
-    """Turns by 1 / fold of a full turn; None: by any angle."""
-    residual: float
-    """Metres: 99 % of the turned surface is nearer than this to the surface, after each of `transforms`."""
-
-    @property
-    def transforms(self) -> Array:
-        """The rotations (K, 4, 4) without the identity; 16 that stand for all where any angle will do."""
-        return turns(self.axis, self.origin, angles_of(self.fold))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +112,7 @@ def find_symmetries(
     model = ObjectModel(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))
     triangles = model.vertices[model.faces]
     areas = trimesh.triangles.area(triangles)
-    if not areas.sum() > 0.0:
+    if areas.sum() < LEAST_AREA * model.diameter**2:
         raise ValueError("mesh must have a surface; the area of its faces is 0")
     centroid = np.average(triangles.mean(axis=1), axis=0, weights=areas)
     surface = surface_of((model.vertices - centroid) / model.diameter, model.faces)
@@ -265,28 +245,9 @@ def refined(
     return axis, origin
 
 
-def angles_of(fold: int | None) -> Array:
-    """The angles (K,) by which an axis of this order turns, without 0; 16 for an axis of revolution."""
-    return TURNS if fold is None else 2.0 * np.pi * np.arange(1, fold) / fold
-
-
-def axis_rotations(axis: Array, angles: Array) -> Array:
-    """Rotation matrices (K, 3, 3) about an axis (3,), or about each of (K, 3), by angles (K,) or (1,)."""
-    return Rotation.from_rotvec(angles[:, None] * axis).as_matrix()
-
-
 def moved_by(transforms: Array, points: Array) -> Array:
     """Points (K, N, 3): all of `points` (N, 3) after each of `transforms` (K, 4, 4)."""
     return points @ transforms[:, :3, :3].swapaxes(1, 2) + transforms[:, None, :3, 3]
-
-
-def turns(axis: Array, origin: Array, angles: Array) -> Array:
-    """The same as transforms (K, 4, 4) that leave `origin` (3,) where it is."""
-    rotations = axis_rotations(axis, angles)
-    transforms = np.tile(np.eye(4), (len(rotations), 1, 1))
-    transforms[:, :3, :3] = rotations
-    transforms[:, :3, 3] = origin - rotations @ origin
-    return transforms
 
 
 def implied(axis: Array, prime: int, found: Sequence[SuggestedSymmetry]) -> bool:
@@ -309,59 +270,3 @@ def distinct(found: Sequence[SuggestedSymmetry]) -> list[SuggestedSymmetry]:
             kept.append(suggestion)
     round_axes = [s for s in kept if s.fold is None]
     return [*round_axes, *flips(kept, round_axes[0])[:1]] if round_axes else kept
-
-
-def order(suggestion: SuggestedSymmetry) -> float:
-    """Number of rotations about its axis."""
-    return np.inf if suggestion.fold is None else suggestion.fold
-
-
-def flips(suggestions: Sequence[SuggestedSymmetry], revolution: SuggestedSymmetry) -> list[SuggestedSymmetry]:
-    """Those that turn over an axis of revolution: half turns about an axis across it."""
-    return [
-        s
-        for s in suggestions
-        if s.fold is not None and s.fold % 2 == 0 and abs(s.axis @ revolution.axis) < np.sin(SAME_AXIS)
-    ]
-
-
-def as_symmetries(suggestions: Sequence[SuggestedSymmetry]) -> Symmetries:
-    """The symmetries that accepted suggestions amount to, as BOP writes them.
-
-    Discrete axes give every rotation that can be composed of theirs: the three half turns of a box, 23
-    rotations of a cube. With one axis of revolution, the flip is discrete, if there is one: BOP multiplies
-    the two. BOP has no word for a sphere: its axes are listed side by side, which stands for the turns about
-    each of them but not for those composed of several.
-
-    Raises:
-        ValueError: where `suggestions` contradict each other: their axes belong to no finite group.
-    """
-    revolutions = [s for s in suggestions if s.fold is None]
-    continuous = tuple(ContinuousSymmetry(_triple(s.axis), _triple(s.origin)) for s in revolutions)
-    if not revolutions:
-        return discrete(closed([T for s in suggestions for T in s.transforms]))
-    if len(revolutions) > 1:
-        return Symmetries(continuous=continuous)
-    half_turn = np.array([np.pi])
-    over = [turns(s.axis, s.origin, half_turn)[0] for s in flips(suggestions, revolutions[0])[:1]]
-    return Symmetries(discrete(over).discrete, continuous)
-
-
-def closed(transforms: Sequence[Array]) -> list[Array]:
-    """All rotations (4, 4) composed of some, without the identity; measured ones stand before products."""
-    elements = [np.eye(4)]
-    pending = list(transforms)
-    while pending:
-        T = pending.pop(0)
-        if any(pose.rotation_angle(T[:3, :3].T @ E[:3, :3]) < SAME_ROTATION for E in elements):
-            continue
-        elements.append(T)
-        if len(elements) > MOST_ROTATIONS:
-            raise ValueError("suggestions contradict each other: turns about their axes never close a cycle")
-        pending += [product for E in elements for product in (T @ E, E @ T)]
-    return elements[1:]
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return x, y, z

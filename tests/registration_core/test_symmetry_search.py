@@ -74,7 +74,7 @@ def test_finds_the_axes_of_known_shapes(name, expected) -> None:
     ("name", "rotations"),
     [
         ("box", 4), ("square prism", 8), ("cube", 24), ("hexagonal prism", 12),
-        ("icosahedron", 60), ("L", 1),
+        ("L", 1),
     ],
 )  # fmt: skip
 def test_closes_the_group(name, rotations) -> None:
@@ -85,13 +85,6 @@ def test_closes_the_group(name, rotations) -> None:
     for a in group:
         apart = np.abs((a @ group)[:, None] - group).max(axis=(2, 3))
         assert apart.min(axis=1).max() < 1e-3
-
-
-def test_axes_that_are_not_named_follow_from_the_others() -> None:
-    x, y, _ = found_in("box")
-    assert len(as_symmetries([x, y]).discrete) == 3
-    four, three = (next(s for s in found_in("cube") if s.fold == fold) for fold in (4, 3))
-    assert len(as_symmetries([four, three]).discrete) == 23
 
 
 def test_the_axis_and_the_flip_of_a_cylinder() -> None:
@@ -107,12 +100,6 @@ def test_the_axis_and_the_flip_of_a_cylinder() -> None:
     transforms = symmetries.transforms(0.134)
     for T in transforms[:: len(transforms) // 40]:
         assert misses(mesh, T[None], 300).max() < 0.001
-
-
-def test_a_cone_is_not_turned_over() -> None:
-    symmetries = as_symmetries(found_in("cone"))
-    assert len(symmetries.continuous) == 1
-    assert symmetries.discrete == ()
 
 
 def test_a_sphere_has_three_axes_at_right_angles() -> None:
@@ -249,10 +236,3 @@ def test_refuses_a_tolerance_that_is_none(tolerance) -> None:
 def test_refuses_a_mesh_without_a_surface(vertices, faces, message) -> None:
     with pytest.raises(ValueError, match=message):
         find_symmetries(trimesh.Trimesh(vertices, faces, process=False))
-
-
-def test_refuses_axes_that_contradict_each_other() -> None:
-    five = SuggestedSymmetry(np.array([0.0, 0.0, 1.0]), np.zeros(3), 5, 0.0)
-    seven = SuggestedSymmetry(np.array([0.0, np.sin(0.7), np.cos(0.7)]), np.zeros(3), 7, 0.0)
-    with pytest.raises(ValueError, match="suggestions contradict each other"):
-        as_symmetries([five, seven])
