@@ -24,7 +24,7 @@ from app.snapping import SnapError, Snapper
 from app.tables import EstimateRow, Frame, Registration, Scene, Task
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, pose
-from registration_core.snap import region_of_interest
+from registration_core.problem import region_of_interest
 
 logger = logging.getLogger(__name__)
 
