@@ -14,7 +14,7 @@ from registration_core.snap_config import ParticleFilterConfig
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import CAMERA, SimpleScene, standing_tool
 
-EVERY_PIXEL = ParticleFilterConfig(pixels_across=1_000)
+EVERY_PIXEL = ParticleFilterConfig(silhouette_pixels=1_000_000)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_truth_beats_what_lies_beside_it(scene) -> None:
 
 def test_fewer_pixels_give_about_the_same_weight(scene) -> None:
     T = centred(scene.truth, scene.model.centre)[None]
-    coarse = np.exp(likelihood_of(scene, ParticleFilterConfig(pixels_across=20))(T))
+    coarse = np.exp(likelihood_of(scene, ParticleFilterConfig(silhouette_pixels=200))(T))
     np.testing.assert_allclose(coarse, np.exp(likelihood_of(scene)(T)), atol=0.06)
 
 
