@@ -28,7 +28,7 @@ class RenderedLikelihood:
 
     The observed cloud is cropped to the points within the hypothesis's bounding sphere, widened by epsilon so
     that it holds every inlier: both shares of Eq. 5 are then at most 1.
-    Every k-th row and column is used, where the object covers more pixels than are needed.
+    Only every k-th column and row is used where the object covers more pixels than are needed.
     """
 
     def __init__(
@@ -41,19 +41,13 @@ class RenderedLikelihood:
         config: ParticleFilterConfig,
     ) -> None:
         left, top, right, bottom = window(camera, centre, model.radius, reach)
-        distance = max(float(centre[2]), NEAREST)
-        silhouette = model.mean_area * camera.fx * camera.fy / distance**2
-        step = max(1, int(np.sqrt(silhouette / config.silhouette_pixels)))
+        across, down = strides(model, camera, float(centre[2]), config.silhouette_pixels)
+        fx, fy = camera.fx / across, camera.fy / down
         # unmeasured rows around: a hypothesis that leaves the window must not gain by showing fewer pixels
-        margin = int(np.ceil(2.0 * model.radius * camera.fx / step / max(float(centre[2]), model.radius)))
-        seen = np.pad(depth[top:bottom:step, left:right:step], margin)
+        margin = int(np.ceil(2.0 * model.radius * max(fx, fy) / max(float(centre[2]), model.radius)))
+        seen = np.pad(depth[top:bottom:down, left:right:across], margin)
         self._depth = np.where(seen > 0.0, seen, f4(np.inf))
-        self._camera = (
-            camera.fx / step,
-            camera.fy / step,
-            (camera.cx - left) / step + margin,
-            (camera.cy - top) / step + margin,
-        )
+        self._camera = (fx, fy, (camera.cx - left) / across + margin, (camera.cy - top) / down + margin)
         self._vertices = model.coarse_vertices
         self._faces = model.coarse_faces
         self._both_sides = not model.coarse_is_closed
@@ -69,6 +63,15 @@ class RenderedLikelihood:
         )  # fmt: skip
         with np.errstate(divide="ignore"):
             return np.log(weights)
+
+
+def strides(model: ViewpointModel, camera: Intrinsics, distance: float, pixels: int) -> tuple[int, int]:
+    """Steps (columns, rows) from one used pixel to the next, so that the mean silhouette covers about
+    `pixels`, if it covers as many at all, and never fewer.
+    """
+    surplus = model.mean_area * camera.fx * camera.fy / max(distance, NEAREST) ** 2 / pixels
+    across = max(1, int(np.sqrt(surplus)))
+    return across, max(1, int(surplus / across))
 
 
 @njit(**EXACT)
@@ -100,9 +103,7 @@ def rendered_agreement(
         x, y, z = T[0, 3], T[1, 3], T[2, 3]
         top, bottom = pixels_between(*_sphere_extent(y, z, crop, fy, cy, height), height)
         left, right = pixels_between(*_sphere_extent(x, z, crop, fx, cx, width), width)
-        observed = _cropped(
-            depth, u, v, (top, bottom, left, right), f4(x), f4(y), f4(z), f4(crop * crop)
-        )
+        observed = _cropped(depth, u, v, (top, bottom, left, right), f4(x), f4(y), f4(z), f4(crop * crop))
         weights[i] = alpha * inliers / max(observed, 1) + beta * inliers / max(rendered, 1)  # Eq. 5
 
 

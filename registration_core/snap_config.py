@@ -157,7 +157,7 @@ class ParticleFilterConfig:
     noise_rotation: float = 0.02
     """The same for the rotation vector, radians."""
     silhouette_pixels: int = 600
-    """Every k-th row and column is used, as long as the mean silhouette still covers this many pixels."""
+    """Every k-th column and row is used, as long as the mean silhouette still covers this many pixels."""
 
 
 DEFAULT_STAGES = (
