@@ -133,24 +133,26 @@ def test_front_sides_of_a_closed_mesh_show_all_of_it() -> None:
     assert (inside_out < both).sum() > 1000  # what is left is the far side
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.3, np.pi / 4, 1.1])
-def test_no_crack_opens_between_triangles(turn: float) -> None:
-    # a fine grid with many vertices and edges exactly on, or within rounding of, the centres of pixels
-    steps = np.arange(41) - 20.0
-    x, y = np.meshgrid(steps, steps)
-    shift = np.array([CAMERA.cx - 155.0, CAMERA.cy - 122.0])
-    c, s = np.cos(turn), np.sin(turn)
-    pixels = np.stack([c * x - s * y, s * x + c * y], axis=-1).reshape(-1, 2) - shift
-    vertices = np.column_stack([pixels / [CAMERA.fx, CAMERA.fy], np.ones(len(pixels))]) * 0.7
-    corner = (np.arange(40)[:, None] * 41 + np.arange(40)).reshape(-1, 1)
-    faces = np.concatenate([corner + np.array([0, 1, 42]), corner + np.array([0, 42, 41])]).astype(np.int32)
-    inverse_depth, _, _ = drawn(vertices, faces, True)
-    rows, columns = np.mgrid[: CAMERA.height, : CAMERA.width] - np.array([122.0, 155.0])[:, None, None]
-    across, down = c * columns + s * rows, c * rows - s * columns
-    inner = (np.abs(across) < 20 - 1e-6) & (np.abs(down) < 20 - 1e-6)
-    np.testing.assert_allclose(inverse_depth[inner], 1 / 0.7, rtol=1e-6)
-    outer = (np.abs(across) > 20 + 1e-6) | (np.abs(down) > 20 + 1e-6)
-    assert not inverse_depth[outer].any()
+@pytest.mark.parametrize(
+    "sides", [((1, 0), (0, 1)), ((5, 2), (-3, 4)), ((20, 8), (-12, 16)), ((0.3, 1), (-1, 0.3))]
+)
+def test_no_crack_opens_between_triangles(sides: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    # a grid of 8 x 8 parallelograms, with edges on the centres of pixels but for the rounding
+    basis, middle = np.array(sides), np.array([155.0, 122.0])
+    x, y = np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))
+    pixels = np.stack([x, y], axis=-1).reshape(-1, 2) @ basis + middle
+    rays = (pixels - [CAMERA.cx, CAMERA.cy]) / [CAMERA.fx, CAMERA.fy]
+    corners = (np.arange(8)[:, None] * 9 + np.arange(8)).reshape(-1, 1)
+    faces = np.concatenate([corners + np.array([0, 1, 10]), corners + np.array([0, 10, 9])])
+    columns, rows = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
+    steps = (np.stack([columns, rows], axis=-1) - middle) @ np.linalg.inv(basis)
+    reach = np.abs(steps).max(axis=-1)
+    assert (reach < 4 - 1e-6).sum() > 40
+    for z in np.linspace(0.5, 1.5, 40):
+        vertices = np.column_stack([rays, np.ones(len(rays))]) * z
+        inverse_depth, _, _ = drawn(vertices, faces.astype(np.int32), True)
+        np.testing.assert_allclose(inverse_depth[reach < 4 - 1e-6], 1 / z, rtol=1e-6)
+        assert not inverse_depth[reach > 4 + 1e-6].any()
 
 
 def test_triangle_seen_edge_on_shows_nothing() -> None:
