@@ -51,6 +51,11 @@ def decimated(vertices: Array32, faces: NDArray[np.int32], most: int) -> tuple[A
 
 
 def is_closed(vertices: Array32, faces: NDArray[np.int32]) -> bool:
-    """Whether a mesh has an inside, with its faces wound counter-clockwise seen from outside."""
+    """Whether each part of a mesh has an inside, with its faces wound counter-clockwise seen from outside."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
-    return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0)
+    if not (mesh.is_watertight and mesh.is_winding_consistent):
+        return False
+    part = trimesh.graph.connected_component_labels(mesh.face_adjacency, node_count=len(faces))
+    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
+    volumes = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))  # six times, signed
+    return bool((volumes > 0.0).all())

@@ -17,9 +17,9 @@ from registration_core import pose
 from registration_core.agreement import surface_of
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, SnapStep
-from registration_core.kernels import to_rows
+from registration_core.kernels import f4, to_rows
 from registration_core.likelihood import RenderedLikelihood
-from registration_core.object_model import ObjectModel
+from registration_core.object_model import ObjectModel, discrete
 from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
@@ -130,12 +130,20 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
 
 
 def warm_up() -> None:
-    """Compile or load every kernel by a tiny snap of each method, so that the first real one is fast."""
+    """Compile or load every kernel by a few tiny snaps, so that the first real one is fast.
+
+    They meet what any snap may meet: a supporting plane, a symmetry, depth that is cropped or taken whole.
+    """
     box = trimesh.creation.box((0.08, 0.05, 0.03))
-    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
-    camera = Intrinsics(160, 120, 150.0, 150.0, 79.5, 59.5)
+    half_turn = discrete([np.diag([-1.0, -1.0, 1.0, 1.0])])
+    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32), half_turn)
+    camera = Intrinsics(320, 240, 150.0, 150.0, 159.5, 119.5)
     T = pose.exp([0.0, 0.0, 0.4, 0.5, 0.3, 0.0])
-    depth = render_depth(model, camera, T)
+    drawn = render_depth(model, camera, T)
+    depth = np.where(drawn > 0.0, drawn, f4(0.45))
     short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
     for config in (SnapConfig(), short):
-        snap(model, depth, camera, T, config, np.random.default_rng(0))
+        left, top, width, height = region_of_interest(model, camera, T, config)
+        part = np.ascontiguousarray(depth[top : top + height, left : left + width])
+        for image, seen_by in ((depth, camera), (part, camera.cropped(left, top, width, height))):
+            snap(model, image, seen_by, T, config, np.random.default_rng(0))

@@ -195,8 +195,8 @@ class ParticleFilterConfig:
     """Standard deviation added to each axis after resampling, metres."""
     noise_rotation: float = 0.02
     """The same for the rotation vector, radians."""
-    pixels_across: int = 40
-    """Every 2nd, 4th or 8th pixel is used as long as the object's diameter still spans this many."""
+    silhouette_pixels: int = 600
+    """Every k-th column and row is used, as long as the mean silhouette still covers this many pixels."""
 
 
 ANYWHERE_STAGES = (
