@@ -1,6 +1,7 @@
 """What runs inside a worker process, run in one."""
 
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,19 @@ def test_it_finds_what_the_library_finds(client, addresses, model, config):
     assert result.hardware
 
 
+@pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])
+def test_it_searches_as_far_as_it_is_told(client, addresses, model, method):
+    config = SnapConfig.from_dict({"method": method, "particle_filter": {"particles": 60, "iterations": 20}})
+    found = []
+    for spread in (None, (0.006, 0.1), (0.06, 1.0)):
+        job = new_job(model, config=config, start_spread=spread)
+        result = run(client, addresses[0], worker.run_snap, job, model)
+        assert_same(result.estimate, done_here(job, model))
+        found.append(result.estimate.covariance)
+    for one, other in combinations(found, 2):
+        assert not np.array_equal(one, other)
+
+
 def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model):
     here, there = addresses
     assert run(client, here, worker.run_snap, new_job(model), None) is None
@@ -94,6 +108,8 @@ def test_a_bad_job_is_refused_by_name(client, addresses, model):
     far[:3, 3] = [50.0, 0.0, 1.0]
     with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
         run(client, addresses[0], worker.run_snap, new_job(model, T_camera_object=far), model)
+    with pytest.raises(ValueError, match="start_spread must be"):
+        run(client, addresses[0], worker.run_snap, new_job(model, start_spread=(-1.0, 0.1)), model)
 
 
 def test_only_the_recent_objects_are_kept(monkeypatch):
