@@ -9,5 +9,5 @@ down_revision = "0001"
 
 def upgrade() -> None:
     """Apply."""
-    # Not as a batch: that would copy the table and lose the triggers that keep it append-only.
+    # In place: a table copied by a batch would lose the triggers that keep it append-only.
     op.add_column("estimates", sa.Column("start_spread", sa.JSON(none_as_null=True), nullable=True))

@@ -114,10 +114,10 @@ def test_a_snap_searches_as_far_as_it_is_told_and_can_be_repeated(
         estimate = finished_snap(script, snap_id)["estimate"]
         requested = next(event for event in log_of(script, near["id"]) if event["snap_id"] == snap_id)
         assert estimate["start_spread"] == requested["detail"]["start_spread"] == spread
-        found.append((estimate["T_world_object"], estimate["covariance"]))
+        found.append((estimate["T_world_object"], estimate["confidence"]))
         script.post(f"{url_of(near)}/undo")
     assert found[0] == found[1]
-    assert found[0] != found[2] != found[3] != found[0]
+    assert len({confidence for _, confidence in found}) == 3
 
 
 def test_where_nothing_is_told_the_last_drags_tell(
@@ -130,11 +130,13 @@ def test_where_nothing_is_told_the_last_drags_tell(
     dragged = finished_snap(script, request_snap(script, near, seed=11))["estimate"]
     assert dragged["start_spread"] == pytest.approx([0.02, SnapConfig().spread.rotation])
     script.post(f"{url_of(near)}/undo")
-    again = request_snap(script, near, seed=11, start_spread=dragged["start_spread"])
-    assert finished_snap(script, again)["estimate"]["T_world_object"] == dragged["T_world_object"]
+    told = request_snap(script, near, seed=11, start_spread=dragged["start_spread"])
+    again = finished_snap(script, told)["estimate"]
+    assert again["T_world_object"] == dragged["T_world_object"]
+    assert again["confidence"] == dragged["confidence"]
     script.post(f"{url_of(near)}/undo")
-    unknown = finished_snap(script, request_snap(script, near, start_spread=None))["estimate"]
-    assert unknown["start_spread"] is None
+    unknown = finished_snap(script, request_snap(script, near, seed=11, start_spread=None))["estimate"]
+    assert unknown["start_spread"] is None and unknown["confidence"] != dragged["confidence"]
 
 
 def test_a_snap_needs_no_body(script: httpx.Client, near: dict[str, Any]) -> None:
@@ -231,6 +233,14 @@ def test_a_bad_wish_names_the_field(
     assert words in sentence(script.post(f"{url_of(near)}/snaps", json=body), 422)
     assert kinds(script, near["id"]) == before
     assert script.get(url_of(near)).json()["snap"] is None
+
+
+def test_a_spread_that_is_no_number_is_said(script: httpx.Client, near: dict[str, Any]) -> None:
+    for content in ('{"start_spread": [NaN, 0.1]}', '{"start_spread": [0.1, Infinity]}'):
+        answer = script.post(
+            f"{url_of(near)}/snaps", content=content, headers={"content-type": "application/json"}
+        )
+        assert "body.start_spread." in sentence(answer, 422)
 
 
 def test_a_submitted_registration_is_not_snapped(script: httpx.Client, near: dict[str, Any]) -> None:

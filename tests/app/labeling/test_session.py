@@ -13,6 +13,7 @@ from app.labeling.session import ActionError, LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.tables import EstimateRow
 from registration_core import Estimate, Hypothesis, SnapConfig, pose
+from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
 FRAMES = (11, 12)
@@ -23,13 +24,6 @@ def shifted(amount: float, axis: int = 0) -> np.ndarray:
     twist = np.zeros(6)
     twist[axis] = amount
     return START @ pose.exp(twist)
-
-
-def about_pivot(rotation: list[float]) -> np.ndarray:
-    """A turn of the gizmo that leaves it in its place."""
-    turn = pose.exp([0.0, 0.0, 0.0, *rotation])
-    turn[:3, 3] = PIVOT - turn[:3, :3] @ PIVOT
-    return turn
 
 
 class Log:
@@ -344,7 +338,7 @@ def test_a_snap_is_applied_with_its_estimate(bench):
 
 def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
     bench.drag(shifted(0.03))
-    bench.drag(shifted(0.03) @ about_pivot([0.0, 0.3, 0.0]))
+    bench.drag(shifted(0.03) @ about(PIVOT, turn(1, 0.3)))
     bench.session.snap(Actor.HUMAN)
     (snap,) = bench.workers.snaps
     assert snap.order.start_spread == pytest.approx((0.03, 0.3))

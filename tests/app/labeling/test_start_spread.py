@@ -7,6 +7,7 @@ from app.labeling.history import replay
 from app.labeling.start_spread import ROTATION_BOUNDS, TRANSLATION_BOUNDS, spread_from_drags
 from registration_core import pose
 from registration_core.snap_config import SpreadConfig
+from tests.app.labeling.test_degrees_of_freedom import about
 from tests.app.labeling.test_history import Logged
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
@@ -17,9 +18,7 @@ DEFAULT = SpreadConfig()
 
 def gizmo(x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> np.ndarray:
     """A motion in the gizmo's axes, metres and radians, as one of the object."""
-    T_object_gizmo = pose.from_rotation_translation(np.eye(3), PIVOT)
-    shift = pose.from_rotation_translation(np.eye(3), [x, y, 0.0])
-    return T_object_gizmo @ shift @ pose.exp([0, 0, 0, 0, turn, 0]) @ pose.inverse(T_object_gizmo)
+    return about(PIVOT, pose.exp([x, y, 0, 0, 0, 0]) @ pose.exp([0, 0, 0, 0, turn, 0]))
 
 
 def told(*actions: tuple[str, np.ndarray] | str) -> tuple[float, float] | None:
