@@ -237,6 +237,7 @@ class Desk:
             T_camera_object=T_camera_object,
             config=order.config,
             seed=order.seed,
+            start_spread=order.start_spread,
         )
 
     def _make_view(self, seat: Seat) -> SceneView:
