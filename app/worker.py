@@ -16,7 +16,7 @@ from distributed import get_worker
 from numpy.typing import NDArray
 
 from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap_steps
-from registration_core.snap import warm_up
+from registration_core.compilation import warm_up
 from registration_core.viewpoint_model import viewpoint_model
 
 KEPT_MODELS = 64

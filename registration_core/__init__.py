@@ -1,12 +1,13 @@
 """Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
 
 from registration_core.camera import Intrinsics
+from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
 from registration_core.global_search import propose
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
-from registration_core.snap import snap, snap_steps, warm_up
+from registration_core.snap import snap, snap_steps
 from registration_core.snap_config import SnapConfig
 from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
 from registration_core.symmetry_search import find_symmetries

@@ -116,7 +116,7 @@ def observe_region(
     rows, columns = max(bottom - top, 0) // block, max(right - left, 0) // block
     reduced = np.zeros((rows + 2, columns + 2), np.float32)
     part = depth[top:bottom, left:right]
-    measured = np.where((part > 0) & (part < FARTHEST), part, f4(0))  # NaN is neither
+    measured = np.ascontiguousarray(np.where((part > 0) & (part < FARTHEST), part, f4(0)))  # NaN is neither
     _reduce(measured, block, f4(config.depth_gap), reduced)
     # a block's centre lies (block - 1) / 2 pixels beyond its first pixel; the border shifts the grid by one
     fx, fy = f4(camera.fx / block), f4(camera.fy / block)

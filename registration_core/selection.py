@@ -51,7 +51,7 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
     """Log-odds (N,) of candidates, up to a constant, of their counts (N, evidence.COUNT) and how far they are
     from the start, (N,) as `heavy_tails` gives it.
     """
-    weights = np.array(config.weights)
+    weights = np.array([*config.off_plane, *config.on_plane, config.unmeasured, *config.ring])
     return counts @ weights + config.match_share * match_shares(counts) - config.prior * tails
 
 

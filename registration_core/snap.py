@@ -10,25 +10,22 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike
 
-from registration_core import pose
 from registration_core.agreement import surface_of
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, SnapStep
-from registration_core.kernels import f4, to_rows
+from registration_core.kernels import to_rows
 from registration_core.likelihood import RenderedLikelihood
-from registration_core.object_model import ObjectModel, discrete
+from registration_core.object_model import ObjectModel
 from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
-from registration_core.rasterizer import render_depth
 from registration_core.report import nothing_seen, outcome, progress, verdict
 from registration_core.search import Search
 from registration_core.seeding import seed_of
 from registration_core.selection import is_settled
-from registration_core.snap_config import ParticleFilterConfig, SnapConfig
+from registration_core.snap_config import SnapConfig
 
 
 def snap(
@@ -127,23 +124,3 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
             yield progress(search, iteration, config.iterations, ranked)
         else:
             yield outcome(search, iteration, ranked, particles.log_weights[order])
-
-
-def warm_up() -> None:
-    """Compile or load every kernel by a few tiny snaps, so that the first real one is fast.
-
-    They meet what any snap may meet: a supporting plane, a symmetry, depth that is cropped or taken whole.
-    """
-    box = trimesh.creation.box((0.08, 0.05, 0.03))
-    half_turn = discrete([np.diag([-1.0, -1.0, 1.0, 1.0])])
-    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32), half_turn)
-    camera = Intrinsics(320, 240, 150.0, 150.0, 159.5, 119.5)
-    T = pose.exp([0.0, 0.0, 0.4, 0.5, 0.3, 0.0])
-    drawn = render_depth(model, camera, T)
-    depth = np.where(drawn > 0.0, drawn, f4(0.45))
-    short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
-    for config in (SnapConfig(), short):
-        left, top, width, height = region_of_interest(model, camera, T, config)
-        part = np.ascontiguousarray(depth[top : top + height, left : left + width])
-        for image, seen_by in ((depth, camera), (part, camera.cropped(left, top, width, height))):
-            snap(model, image, seen_by, T, config, np.random.default_rng(0))

@@ -118,7 +118,7 @@ class StageConfig:
 class SelectionConfig:
     """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
 
-    prior: float = 1.79
+    prior: float = 1.59
     """Weight of the heavy-tailed prior about the start."""
     gain_near: float = 1.5
     """The polished start replaces the start only if it scores better by this much."""
@@ -132,50 +132,30 @@ class SelectionConfig:
     """... that moved no farther than this, metres, ..."""
     settled_rotation: float = 0.13
     """... and this, radians, nothing else is looked for."""
-    match_share: float = 7.1
+    match_share: float = 6.9
     """Weight of the share of the claimed surface that was measured where it is claimed."""
-    weights: tuple[float, ...] = (
-        1.0,
-        -14.3,
-        -15.3,
-        -12.2,
-        3.3,
-        -15.9,
-        -29.8,
-        -32.0,
-        -9.3,
-        -5.5,
-        -17.6,
-        -54.1,
-        -24.7,
-        -39.2,
-        -33.2,
-        -13.5,
-        -3.4,
-        20.0,
-        0.0,
-        0.0,
-        -20.9,
-        -12.5,
-        0.0,
-        -7.7,
-        4.4,
-    )
-    """Of the classes of evidence.py, in their order."""
+    off_plane: tuple[float, ...] = (-0.3, -17.0, -28.9, -6.1, 5.1, -22.7, -26.5, -25.1, -4.9)
+    """Weights of pixels off the plane, by how far behind the claimed surface they were measured."""
+    on_plane: tuple[float, ...] = (-5.2, -16.7, -48.8, -16.7, -25.8, -27.6, -14.0)
+    """The same for pixels on it."""
+    unmeasured: float = -3.0
+    """Weight of pixels without a measurement."""
+    ring: tuple[float, ...] = (10.0, 0.0, 10.0, 26.2, -24.7, -9.3, -8.7, 10.0)
+    """Weights of what lies just beyond the outline."""
 
 
 @dataclass(frozen=True)
 class ConfidenceConfig:
     """Logistic calibration of the confidence (confidence.py)."""
 
-    temperature: float = 2.0
+    temperature: float = 1.0
     """Of the softmax that shares the mass among the modes."""
     mode_radius: float = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
-    intercept: float = -5.0
-    mass: float = 7.9
+    intercept: float = -9.54
+    mass: float = 6.29
     """Weight of the share of the belief that the winning mode has."""
-    match: float = 4.7
+    match: float = 8.88
     """Weight of the share of the claimed surface that was measured where it should be."""
 
 

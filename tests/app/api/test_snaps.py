@@ -125,10 +125,10 @@ def test_where_nothing_is_told_the_last_drags_tell(
 ) -> None:
     session = live.services.desk._seats[near["id"]].session
     session.start_drag()
-    session.drag_to(NEAR @ pose.exp([0.02, 0, 0, 0, 0, 0]))
+    session.drag_to(NEAR @ pose.exp([0.05, 0, 0, 0, 0, 0]))
     session.end_drag()
     dragged = finished_snap(script, request_snap(script, near, seed=11))["estimate"]
-    assert dragged["start_spread"] == pytest.approx([0.02, SnapConfig().spread.rotation])
+    assert dragged["start_spread"] == pytest.approx([0.05, SnapConfig().spread.rotation])
     script.post(f"{url_of(near)}/undo")
     told = request_snap(script, near, seed=11, start_spread=dragged["start_spread"])
     again = finished_snap(script, told)["estimate"]

@@ -337,11 +337,11 @@ def test_a_snap_is_applied_with_its_estimate(bench):
 
 
 def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
-    bench.drag(shifted(0.03))
-    bench.drag(shifted(0.03) @ about(PIVOT, turn(1, 0.3)))
+    bench.drag(shifted(0.05))
+    bench.drag(shifted(0.05) @ about(PIVOT, turn(1, 0.7)))
     bench.session.snap(Actor.HUMAN)
     (snap,) = bench.workers.snaps
-    assert snap.order.start_spread == pytest.approx((0.03, 0.3))
+    assert snap.order.start_spread == pytest.approx((0.05, 0.7))
     assert bench.log.events[-1].detail["start_spread"] == list(snap.order.start_spread)
     snap.end(result(shifted(0.05)))
     (row,) = bench.log.estimates
@@ -358,13 +358,13 @@ def test_a_drag_under_way_is_told_as_if_it_ended(bench):
     bench.session.snap(Actor.HUMAN)
     held, moved = (snap.order.start_spread for snap in bench.workers.snaps)
     assert held == pytest.approx((0.05, SnapConfig().spread.rotation))
-    assert moved == pytest.approx((0.02, SnapConfig().spread.rotation))
+    assert moved == pytest.approx((SnapConfig().spread.translation, SnapConfig().spread.rotation))
 
 
 def test_the_part_that_no_drag_tells_is_the_configurations(bench):
-    bench.drag(shifted(0.03))
+    bench.drag(shifted(0.05))
     bench.session.snap(Actor.SCRIPT, SnapConfig.from_dict({"spread": {"rotation": 0.25}}))
-    assert bench.workers.snaps[0].order.start_spread == pytest.approx((0.03, 0.25))
+    assert bench.workers.snaps[0].order.start_spread == pytest.approx((0.05, 0.25))
 
 
 @pytest.mark.parametrize("given", [None, (0.002, 0.01)])

@@ -9,7 +9,8 @@ import sys
 import numpy as np
 import trimesh
 from numba.core.dispatcher import Dispatcher
-from registration_core import Intrinsics, SnapConfig, pose, region_of_interest, snap, snap_steps, warm_up
+from registration_core import SnapConfig, pose, propose, region_of_interest, snap, snap_steps, snap_views
+from registration_core import warm_up
 from registration_core.procedural_objects import demo_objects
 from registration_core.rasterizer import render_depth
 from tests.registration_core.simple_scene import standing_tool
@@ -30,10 +31,13 @@ for model in [scene.model, *(known.model for known in demo_objects())]:
     depth = np.where((scene.depth == 0) | ((depth > 0) & (depth < scene.depth)), depth, scene.depth)
     left, top, width, height = region_of_interest(model, scene.camera, truth, SnapConfig())
     part, seen_by = depth[top:top + height, left:left + width], scene.camera.cropped(left, top, width, height)
+    start = pose.perturbed(truth, 0.05, 0.5, np.random.default_rng(0))
     for given in (part, part.copy()):
-        snap(model, given, seen_by, truth, None, np.random.default_rng(0))
+        snap(model, given, seen_by, start, None, np.random.default_rng(0))
     for given in (depth, depth.astype(np.float64), depth.tolist(), np.asfortranarray(depth)):
-        snap(model, given, scene.camera, truth, None, np.random.default_rng(0), (0.02, 0.2))
+        snap(model, given, scene.camera, start, None, np.random.default_rng(0), (0.02, 0.2))
+    snap_views(model, [(depth, scene.camera, np.eye(4))], start, rng=np.random.default_rng(0))
+    propose(model, depth, scene.camera, (left, top, width, height), rng=np.random.default_rng(0))
     steps = snap_steps(model, depth, scene.camera, truth, SnapConfig.paper(), np.random.default_rng(0))
     for _ in range(3):
         next(steps)

@@ -1,0 +1,34 @@
+"""Compiling the kernels ahead, at installation or when a worker starts, never in an operator's first snap."""
+
+import numpy as np
+import trimesh
+
+from registration_core import pose
+from registration_core.camera import Intrinsics
+from registration_core.global_search import propose
+from registration_core.kernels import f4
+from registration_core.object_model import ObjectModel, discrete
+from registration_core.rasterizer import render_depth
+from registration_core.snap import snap
+from registration_core.snap_config import AnywhereConfig, ParticleFilterConfig, SnapConfig
+from registration_core.views import snap_views
+
+
+def warm_up() -> None:
+    """Compile or load every kernel by a few tiny snaps, so that the first real one is fast.
+
+    They meet what any snap may meet: a start that is off, a supporting plane, a symmetry.
+    """
+    box = trimesh.creation.box((0.08, 0.05, 0.03))
+    half_turn = discrete([np.diag([-1.0, -1.0, 1.0, 1.0])])
+    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32), half_turn)
+    camera = Intrinsics(320, 240, 150.0, 150.0, 159.5, 119.5)
+    T = pose.exp([0.0, 0.0, 0.4, 0.5, 0.3, 0.0])
+    drawn = render_depth(model, camera, T)
+    depth = np.where(drawn > 0.0, drawn, f4(0.45))
+    start = pose.perturbed(T, 0.03, 0.4, np.random.default_rng(0))
+    short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
+    for config in (SnapConfig(), short):
+        snap(model, depth, camera, start, config, np.random.default_rng(0))
+    snap_views(model, [(depth, camera, np.eye(4))], start, rng=np.random.default_rng(0))
+    propose(model, depth, camera, config=SnapConfig(anywhere=AnywhereConfig(2_000, 500)))
