@@ -61,6 +61,8 @@ class Instance:
     """`T_camera_object` (4, 4)."""
     seed: int
     """Of its starts."""
+    perfect_depth: NDArray[np.float32] | None = None
+    """The same without a sensor's errors, where it is known."""
     color_path: Path | None = None
 
 
@@ -86,6 +88,7 @@ def synthetic_instances(set_name: str, an_object: int) -> list[Instance]:
                     Instance(
                         set_name, f"{set_name} {scene_id}", name, objects[name], views[0].depth,
                         views[0].camera, views[0].instances[index].T_camera_object, len(instances),
+                        views[0].perfect_depth,
                     )
                 )  # fmt: skip
     return instances
@@ -113,7 +116,7 @@ def _ycb() -> Iterator[Instance]:
         for truth in image.ground_truth or ():
             yield Instance(
                 YCB, f"{YCB} {names[truth.obj_id]}", names[truth.obj_id], ycb_object(truth.obj_id), depth,
-                image.camera, truth.T_camera_object, seed, image.color_path,
+                image.camera, truth.T_camera_object, seed, color_path=image.color_path,
             )  # fmt: skip
             seed += 1
 
@@ -125,5 +128,5 @@ def _bunny() -> Iterator[Instance]:
         (truth,) = image.ground_truth or ()
         yield Instance(
             BUNNY, f"{BUNNY} {image.image_id}", BUNNY, model, read_depth(image.depth_path, image.depth_scale),
-            image.camera, truth.T_camera_object, image.image_id, image.color_path,
+            image.camera, truth.T_camera_object, image.image_id, color_path=image.color_path,
         )  # fmt: skip

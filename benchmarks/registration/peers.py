@@ -1,7 +1,7 @@
-"""Other libraries' registration from the same starts, each with the courtesy that makes it faster and better.
+"""Registration by other libraries from the same starts, with the courtesies that make it faster and better.
 
 They align the part of the model that is visible at the start with the points measured near it, coarse to
-fine. Other modules of the project do without these libraries' ICP.
+fine.
 """
 
 from dataclasses import dataclass
@@ -20,13 +20,14 @@ from registration_core.rasterizer import render_depth
 
 Array = NDArray[np.float64]
 
-REACH = 0.05
+REACH = 0.10
 """Points are taken up to this far outside of the model's bounding sphere at the start, metres."""
-LEAST_POINTS = 30
+LEAST_POINTS = 300
+"""Pixels with less of either are no cloud: a start is left as it is."""
 VOXEL = 0.004
 """Points are thinned to one in such a cube, metres."""
 NORMAL_RADIUS, NORMAL_POINTS = 0.015, 30
-ICP_DISTANCES, GICP_DISTANCES = (0.05, 0.02, 0.008), (0.03, 0.01)
+ICP_DISTANCES, GICP_DISTANCES = (0.05, 0.02, 0.008), (0.10, 0.05, 0.02, 0.01)
 """Largest distance of points that are matched, from stage to stage, metres."""
 ITERATIONS = 30
 SCORED_DISTANCE = 0.008

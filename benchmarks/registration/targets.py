@@ -33,6 +33,7 @@ def figures(results: Sequence[InstanceTrials]) -> list[Figure]:
     default = [trial for trial in trials if trial.method == DEFAULT]
     return [
         *_successes(default, RIGHT, "ADD(-S) < 10 %", "is_right"),
+        *_ambiguities(default),
         *_successes(default, EXACT, "MSSD < 5 %", "is_exact"),
         *_noise_limit(results),
         *_rotations(default),
@@ -52,6 +53,14 @@ def _successes(
             if rights:
                 name = f"{set_name}, {measure}, from {shell}"
                 yield Figure(name, _percent(rights), "%", Target(percent, at_least=True))
+
+
+def _ambiguities(trials: Sequence[Trial]) -> Iterable[Figure]:
+    for set_name in SYNTHETIC:
+        elsewhere = [t.fits_elsewhere for t in trials if t.set_name == set_name and t.shell != GOOD]
+        if elsewhere:
+            name = f"{set_name}, wrong though perfect depth would fit as well, of all"
+            yield Figure(name, _percent(elsewhere), "%")
 
 
 def _noise_limit(results: Sequence[InstanceTrials]) -> Iterable[Figure]:
@@ -92,7 +101,7 @@ def _made_worse(trials: Sequence[Trial]) -> Iterable[Figure]:
 
 
 def _peers(trials: Sequence[Trial]) -> Iterable[Figure]:
-    """From the starts that both had: the lead in the shell where it is least, and the time where it is most."""
+    """From the starts that both had, in the shell where the lead is least, and where the time is most."""
     by_start = {(t.instance, t.shell, t.start, t.method): t for t in trials}
     for set_name in SETS:
         for peer in PEERS:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
+from benchmarks.registration.ambiguity import fits_as_well
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.judging import Error, Judge
 from benchmarks.registration.methods import polished_truth, register, warmed_up
@@ -40,6 +41,8 @@ class Trial:
     error: Error
     T_start: Array
     T_result: Array
+    fits_elsewhere: bool
+    """Wrong by ADD(-S), though perfect depth would show it no worse than the truth: nothing could tell."""
     seconds: float
     confidence: float | None
 
@@ -100,11 +103,13 @@ def try_instance(instance: Instance, number: int, plan: Plan, quick: bool) -> In
         for method, count in counts.items():
             for n, T_start in enumerate(poses[:count]):
                 outcome = register(method, instance, T_start, shell, n, quick)
+                error = judge.error(outcome.T_camera_object, instance.truth)
                 trials.append(
                     Trial(
                         instance.set_name, instance.scene, number, shell, n, method, errors[n],
-                        judge.error(outcome.T_camera_object, instance.truth), T_start,
-                        outcome.T_camera_object, outcome.seconds, outcome.confidence,
+                        error, T_start, outcome.T_camera_object,
+                        not error.is_right and fits_as_well(instance, outcome.T_camera_object),
+                        outcome.seconds, outcome.confidence,
                     )
                 )  # fmt: skip
     return InstanceTrials(trials, polish_error)
