@@ -1,4 +1,4 @@
-"""Whether depth could tell a wrong pose from the true one at all: a mug whose handle is hidden fits any way."""
+"""Whether depth could tell a wrong pose from the true one: a mug whose handle is hidden fits anyhow."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.registration.objects import DATA, known_objects, read_model, ycb_object
-from registration_core import Intrinsics, ObjectModel
+from benchmarks.registration.starts import is_in_view
+from registration_core import Intrinsics, ObjectModel, pose
 from registration_core.bop import read_dataset, read_depth
-from registration_core.synthetic_scene import make_scene
+from registration_core.synthetic_scene import View, make_scene
 from registration_core.tabletop import Layout
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def synthetic_instances(set_name: str, an_object: int) -> list[Instance]:
             rng, [objects[name] for name in shown], recipe.distractors, VIEWS_A_SCENE, layout=recipe.layout
         )
         for index, name in enumerate(shown):
-            views = [view for view in scene.views if _shows(view.instances[index].visible, recipe)]
+            views = [view for view in scene.views if _shows(view, index, objects[name], recipe)]
             if found[name] < an_object and views:
                 found[name] += 1
                 instances.append(
@@ -94,9 +95,12 @@ def synthetic_instances(set_name: str, an_object: int) -> list[Instance]:
     return instances
 
 
-def _shows(visible: float, recipe: Recipe) -> bool:
+def _shows(view: View, index: int, model: ObjectModel, recipe: Recipe) -> bool:
+    """Whether as much of an object is visible as wanted, its middle not cut off by the image's border."""
+    seen = view.instances[index]
     least, most = recipe.visible
-    return least <= visible < most
+    centre = pose.apply(seen.T_camera_object, model.centre)
+    return least <= seen.visible < most and is_in_view(centre, view.camera)
 
 
 def real_instances(set_name: str) -> list[Instance]:

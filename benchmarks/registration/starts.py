@@ -50,18 +50,20 @@ def starts(
 
     The object turns about its centre, not about the origin of its mesh, which may lie far outside of it.
     """
+    assert is_in_view(pose.apply(T_camera_object, model.centre), camera)
     rng = np.random.default_rng([seed, round(1e4 * shell.translation), round(1e4 * shell.rotation)])
     T_object_centre = pose.from_rotation_translation(np.eye(3), model.centre)
     truth = T_camera_object @ T_object_centre
     found: list[Array] = []
     while len(found) < count:
         T_camera_centre = pose.perturbed(truth, shell.translation, shell.rotation, rng)
-        if _is_in_view(T_camera_centre[:3, 3], camera):
+        if is_in_view(T_camera_centre[:3, 3], camera):
             found.append(T_camera_centre @ pose.inverse(T_object_centre))
     return found
 
 
-def _is_in_view(centre: Array, camera: Intrinsics) -> bool:
+def is_in_view(centre: Array, camera: Intrinsics) -> bool:
+    """Whether a point (3,), camera axes, metres, lies before the camera and within its image."""
     if centre[2] < NEAREST:
         return False
     column, row = project(centre, camera)
