@@ -1,20 +1,28 @@
 """Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
 
 from registration_core.camera import Intrinsics
+from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps, warm_up
 from registration_core.snap_config import SnapConfig
+from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
+from registration_core.symmetry_search import find_symmetries
 
 __all__ = [
+    "Correspondence",
     "Estimate",
     "Hypothesis",
     "Intrinsics",
     "ObjectModel",
     "SnapConfig",
     "SnapStep",
+    "SuggestedSymmetry",
     "Symmetries",
+    "as_symmetries",
+    "find_symmetries",
+    "pose_from_correspondences",
     "region_of_interest",
     "snap",
     "snap_steps",
