@@ -116,18 +116,10 @@ def _peers(trials: Sequence[Trial]) -> Iterable[Figure]:
                     )
                     shares.append(_median_seconds(ours) / _median_seconds(theirs))
             if leads:
-                yield Figure(
-                    f"{set_name}, successes minus those of {peer}, in the worst shell",
-                    min(leads),
-                    "%",
-                    NOT_BEHIND,
-                )
-                yield Figure(
-                    f"{set_name}, median time of that of {peer}, in the worst shell",
-                    100 * max(shares),
-                    "%",
-                    AS_FAST,
-                )
+                lead = f"{set_name}, successes minus those of {peer}, in the worst shell"
+                time = f"{set_name}, median time of that of {peer}, in the worst shell"
+                yield Figure(lead, min(leads), "%", NOT_BEHIND)
+                yield Figure(time, 100 * max(shares), "%", AS_FAST)
 
 
 def _confidences(trials: Sequence[Trial]) -> Iterable[Figure]:
