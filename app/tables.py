@@ -213,6 +213,7 @@ class EstimateRow(Base):
     converged: Mapped[bool]
     seed: Mapped[int] = mapped_column(BigInteger)
     config: Mapped[dict[str, Any]]
+    start_spread: Mapped[list[Any] | None]
     version: Mapped[str] = mapped_column(String(40))
     hardware: Mapped[str] = mapped_column(String(200))
     seconds: Mapped[float] = mapped_column(Float)

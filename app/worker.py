@@ -45,6 +45,8 @@ class SnapJob:
     T_camera_object: NDArray[np.float64]
     config: SnapConfig
     seed: int
+    start_spread: tuple[float, float] | None
+    """How far off T_camera_object may be, metres and radians; None where that is unknown."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,8 @@ def run_snap(job: SnapJob, model: ObjectModel | None) -> JobResult | None:
     reported = 0.0
     estimate = None
     rng = np.random.default_rng(job.seed)
-    for step in snap_steps(known, job.depth, job.camera, job.T_camera_object, config=job.config, rng=rng):
+    steps = snap_steps(known, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread)
+    for step in steps:
         if job.snap_id in _cancelled:
             raise SnapCancelledError(job.snap_id)
         if time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:

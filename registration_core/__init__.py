@@ -2,13 +2,15 @@
 
 from registration_core.camera import Intrinsics
 from registration_core.correspondence import Correspondence, pose_from_correspondences
-from registration_core.estimate import Estimate, Hypothesis, SnapStep
+from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
+from registration_core.global_search import propose
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps, warm_up
 from registration_core.snap_config import SnapConfig
 from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
 from registration_core.symmetry_search import find_symmetries
+from registration_core.views import snap_views
 
 __all__ = [
     "Correspondence",
@@ -20,11 +22,14 @@ __all__ = [
     "SnapStep",
     "SuggestedSymmetry",
     "Symmetries",
+    "WorldEstimate",
     "as_symmetries",
     "find_symmetries",
     "pose_from_correspondences",
+    "propose",
     "region_of_interest",
     "snap",
     "snap_steps",
+    "snap_views",
     "warm_up",
 ]

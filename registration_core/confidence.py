@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from registration_core.kernels import Array32
 from registration_core.modes import distances
-from registration_core.selection import Residual
+from registration_core.selection import match_shares
 from registration_core.snap_config import ConfidenceConfig
 from registration_core.viewpoint_model import ViewpointModel
 
@@ -37,12 +37,26 @@ def mode_masses(scores: Array, modes: NDArray[np.intp]) -> Array:
     return mass / mass.sum()
 
 
-def confidence(mass: float, shares: Array, config: ConfidenceConfig) -> float:
-    """Probability in [0, 1] that the MSSD is below 5 % of the diameter, for residual shares (12,) of the
+def grouped(
+    poses: Array32, winner: int, scores: Array, model: ViewpointModel, config: ConfidenceConfig
+) -> tuple[NDArray[np.intp], Array]:
+    """Indices of the modes among poses (N, 3, 4), the winner's first and then best first, and the mass of
+    each.
+
+    Args:
+        scores: (N,), log-odds.
+    """
+    order = np.argsort(-scores, kind="stable")
+    order = np.concatenate([[winner], order[order != winner]])
+    modes = modes_of(poses[order], model, config.mode_radius)
+    masses = mode_masses(scores[order], modes)
+    best_first = np.concatenate([[0], 1 + np.argsort(-masses[1:], kind="stable")])
+    return order[np.unique(modes)][best_first], masses[best_first]
+
+
+def confidence(mass: float, counts: Array, config: ConfidenceConfig) -> float:
+    """Probability in [0, 1] that the MSSD is below 5 % of the diameter, for the evidence (COUNT,) of the
     winner.
     """
-    matched = shares[Residual.MATCH] + 0.5 * shares[Residual.PLANE_MATCH]
-    claimed = shares[: Residual.UNMEASURED].sum() - shares[Residual.HIDDEN]
-    match = matched / max(claimed, 0.05)
-    logit = config.intercept + config.mass * mass + config.match * match
+    logit = config.intercept + config.mass * mass + config.match * float(match_shares(counts[None])[0])
     return float(1.0 / (1.0 + np.exp(-logit)))

@@ -40,6 +40,15 @@ class Estimate:
     """`snap(..., rng=np.random.default_rng(seed))` with the same inputs gives this estimate again."""
 
 
+class WorldEstimate(Estimate):
+    """An estimate from several views: the world takes the place of the camera in everything it holds."""
+
+    @property
+    def T_world_object(self) -> Array:
+        """(4, 4), the same as `T_camera_object`."""
+        return self.T_camera_object
+
+
 @dataclass(frozen=True, eq=False)
 class SnapStep:
     """The state of a snap after one iteration."""

@@ -8,9 +8,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from registration_core.camera import Intrinsics
-from registration_core.kernels import EXACT
-from registration_core.observation import reduction, window
-from registration_core.rasterizer import draw_mesh
+from registration_core.kernels import EXACT, f4
+from registration_core.observation import NEAREST, window
+from registration_core.rasterizer import draw_mesh, pixels_between
 from registration_core.snap_config import ParticleFilterConfig
 from registration_core.viewpoint_model import ViewpointModel
 
@@ -28,7 +28,7 @@ class RenderedLikelihood:
 
     The observed cloud is cropped to the points within the hypothesis's bounding sphere, widened by epsilon so
     that it holds every inlier: both shares of Eq. 5 are then at most 1.
-    Every k-th row and column is used, where the object spans more pixels than are needed.
+    Only every k-th column and row is used where the object covers more pixels than are needed.
     """
 
     def __init__(
@@ -41,16 +41,13 @@ class RenderedLikelihood:
         config: ParticleFilterConfig,
     ) -> None:
         left, top, right, bottom = window(camera, centre, model.radius, reach)
-        step = reduction(camera, model.diameter, float(centre[2]), config.pixels_across, 8)
+        across, down = strides(model, camera, float(centre[2]), config.silhouette_pixels)
+        fx, fy = camera.fx / across, camera.fy / down
         # unmeasured rows around: a hypothesis that leaves the window must not gain by showing fewer pixels
-        margin = int(np.ceil(2.0 * model.radius * camera.fx / step / max(float(centre[2]), model.radius)))
-        self._depth = np.pad(depth[top:bottom:step, left:right:step], margin)
-        self._camera = (
-            camera.fx / step,
-            camera.fy / step,
-            (camera.cx - left) / step + margin,
-            (camera.cy - top) / step + margin,
-        )
+        margin = int(np.ceil(2.0 * model.radius * max(fx, fy) / max(float(centre[2]), model.radius)))
+        seen = np.pad(depth[top:bottom:down, left:right:across], margin)
+        self._depth = np.where(seen > 0.0, seen, f4(np.inf))
+        self._camera = (fx, fy, (camera.cx - left) / across + margin, (camera.cy - top) / down + margin)
         self._vertices = model.coarse_vertices
         self._faces = model.coarse_faces
         self._both_sides = not model.coarse_is_closed
@@ -68,68 +65,87 @@ class RenderedLikelihood:
             return np.log(weights)
 
 
+def strides(model: ViewpointModel, camera: Intrinsics, distance: float, pixels: int) -> tuple[int, int]:
+    """Steps (columns, rows) from one used pixel to the next, so that the mean silhouette covers about
+    `pixels`, if it covers as many at all, and never fewer.
+    """
+    surplus = model.mean_area * camera.fx * camera.fy / max(distance, NEAREST) ** 2 / pixels
+    across = max(1, int(np.sqrt(surplus)))
+    return across, max(1, int(surplus / across))
+
+
 @njit(**EXACT)
-def rendered_agreement(  # noqa: PLR0912 - one loop, for speed
+def rendered_agreement(
     poses, vertices, faces, both_sides, radius, depth, fx, fy, cx, cy, epsilon, alpha, beta, weights
 ):
     """W (N,) of Eq. 5 for poses (N, 4, 4); 0 where a hypothesis shows no pixel.
 
     Args:
         vertices, faces: the mesh (V, 3) and (F, 3), its bounding sphere about the origin of `radius`.
-        depth: observed (H, W), metres, 0 = no measurement, for the pinhole camera fx, fy, cx, cy.
+        depth: observed (H, W), metres, inf = no measurement, for the pinhole camera fx, fy, cx, cy.
         epsilon: Eq. 3, metres.
     """
     height, width = depth.shape
-    per_fx, per_fy = 1.0 / fx, 1.0 / fy
-    crop = radius + epsilon
-    inverse_depth = np.zeros((height, width))
+    u = ((np.arange(width) - cx) / fx).astype(np.float32)
+    v = ((np.arange(height) - cy) / fy).astype(np.float32)
+    inverse_depth = np.zeros((height, width), np.float32)
     points = np.empty((vertices.shape[0], 3))
+    crop = radius + epsilon
     for i in range(poses.shape[0]):
         T = poses[i]
-        for v in range(vertices.shape[0]):
+        for n in range(vertices.shape[0]):
             for a in range(3):
-                points[v, a] = (
-                    T[a, 0] * vertices[v, 0] + T[a, 1] * vertices[v, 1] + T[a, 2] * vertices[v, 2] + T[a, 3]
+                points[n, a] = (
+                    T[a, 0] * vertices[n, 0] + T[a, 1] * vertices[n, 1] + T[a, 2] * vertices[n, 2] + T[a, 3]
                 )
+        drawn = draw_mesh(points, faces, fx, fy, cx, cy, inverse_depth, None, both_sides)
+        inliers, rendered = _compare(inverse_depth, depth, u, v, drawn, f4(epsilon * epsilon))
         x, y, z = T[0, 3], T[1, 3], T[2, 3]
-        left, right = _sphere_extent(x, z, crop, fx, cx, width)
-        top, bottom = _sphere_extent(y, z, crop, fy, cy, height)
-        weights[i] = 0.0
-        if left >= right or top >= bottom:
-            continue
-        for row in range(top, bottom):
-            for column in range(left, right):
-                inverse_depth[row, column] = 0.0
-        draw_mesh(points, faces, fx, fy, cx, cy, inverse_depth, None, both_sides)
-        inliers = observed = rendered = 0
-        for row in range(top, bottom):
-            v = (row - cy) * per_fy
-            for column in range(left, right):
-                u = (column - cx) * per_fx
-                q, seen = inverse_depth[row, column], depth[row, column]
-                if seen > 0.0 and abs(seen - z) <= crop:
-                    dx, dy, dz = u * seen - x, v * seen - y, seen - z
-                    if dx * dx + dy * dy + dz * dz <= crop * crop:
-                        observed += 1
-                if q > 0.0:
-                    rendered += 1
-                    # two points of one pixel lie on one ray: their distance is that of the depths, along
-                    # the ray
-                    apart = 1.0 / q - seen
-                    if seen > 0.0 and apart * apart * (u * u + v * v + 1.0) < epsilon * epsilon:  # Eq. 3
-                        inliers += 1  # Eq. 4
-        if rendered > 0:
-            weights[i] = alpha * inliers / max(observed, 1) + beta * inliers / rendered  # Eq. 5
+        top, bottom = pixels_between(*_sphere_extent(y, z, crop, fy, cy, height), height)
+        left, right = pixels_between(*_sphere_extent(x, z, crop, fx, cx, width), width)
+        observed = _cropped(depth, u, v, (top, bottom, left, right), f4(x), f4(y), f4(z), f4(crop * crop))
+        weights[i] = alpha * inliers / max(observed, 1) + beta * inliers / max(rendered, 1)  # Eq. 5
+
+
+@njit(**EXACT)
+def _compare(inverse_depth, depth, u, v, part, squared_epsilon):
+    """(I of Eq. 4, N_r) in a part of the image, which is left cleared for the next hypothesis."""
+    top, bottom, left, right = part
+    inliers = rendered = 0
+    for row in range(top, bottom):
+        drawn, seen, across = inverse_depth[row, left:right], depth[row, left:right], u[left:right]
+        rest = v[row] * v[row] + f4(1)
+        for k in range(len(drawn)):
+            # two points of one pixel lie on one ray: their distance is that of the depths, along the ray
+            apart = f4(1) / drawn[k] - seen[k]
+            inliers += apart * apart * (across[k] * across[k] + rest) < squared_epsilon  # Eq. 3
+            rendered += drawn[k] > f4(0)
+            drawn[k] = f4(0)
+    return inliers, rendered
+
+
+@njit(**EXACT)
+def _cropped(depth, u, v, part, x, y, z, squared_radius):
+    """N_b: the observed points in a part of the image that lie within a sphere about (x, y, z)."""
+    top, bottom, left, right = part
+    count = 0
+    for row in range(top, bottom):
+        seen, across, down = depth[row, left:right], u[left:right], v[row]
+        for k in range(len(seen)):
+            dx, dy, dz = across[k] * seen[k] - x, down * seen[k] - y, seen[k] - z
+            count += dx * dx + dy * dy + dz * dz <= squared_radius
+    return count
 
 
 @njit(**EXACT)
 def _sphere_extent(middle, z, radius, focal, principal, size):
-    """(first, end) of the columns, or rows, in which a sphere at (middle, z) can be seen."""
+    """(low, high) pixel along an axis of the image between which a sphere at (middle, z) can be seen."""
     if z <= -radius:
-        return 0, 0
+        return -1.0, -1.0
     if z - radius < 0.05:
-        return 0, size
+        return 0.0, size - 1.0
     low, high = middle - radius, middle + radius
-    first = low / (z - radius if low < 0.0 else z + radius) * focal + principal
-    last = high / (z - radius if high > 0.0 else z + radius) * focal + principal
-    return int(max(0.0, np.floor(first))), int(min(size - 1.0, np.ceil(last))) + 1
+    return (
+        low / (z - radius if low < 0.0 else z + radius) * focal + principal,
+        high / (z - radius if high > 0.0 else z + radius) * focal + principal,
+    )

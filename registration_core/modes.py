@@ -5,7 +5,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from registration_core.kernels import FAST, Array32, f4, squared_angle
+from registration_core.kernels import FAST, Array32, f4, squared_angle_of
 
 
 def distinct(
@@ -26,22 +26,39 @@ def distinct(
 @njit(**FAST)
 def _distinct(poses, order, per_translation, per_rotation, chosen):
     count = 0
+    kept = np.empty((12, chosen.shape[0]), np.float32)
     for candidate in order:
-        A = poses[candidate]
-        free = True
-        for k in range(count):
-            B = poses[chosen[k]]
-            dx, dy, dz = A[0, 3] - B[0, 3], A[1, 3] - B[1, 3], A[2, 3] - B[2, 3]
-            d = (dx * dx + dy * dy + dz * dz) * per_translation
-            if d < f4(1) and d + squared_angle(A, B) * per_rotation < f4(1):
-                free = False
-                break
-        if free:
-            chosen[count] = candidate
-            count += 1
-            if count == chosen.shape[0]:
-                break
+        T = poses[candidate]
+        if _distance_to_nearest(T, kept, count, per_translation, per_rotation) < f4(1):
+            continue
+        for a in range(3):
+            for b in range(4):
+                kept[4 * a + b, count] = T[a, b]
+        chosen[count] = candidate
+        count += 1
+        if count == chosen.shape[0]:
+            break
     return count
+
+
+@njit(**FAST)
+def _distance_to_nearest(T, kept, count, per_translation, per_rotation):
+    """Squared distance in niches to the nearest of the first `count` poses kept (12, N), one a column."""
+    a0, a1, a2, a3 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
+    b0, b1, b2, b3 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
+    c0, c1, c2, c3 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
+    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = kept
+    nearest = f4(1e9)
+    for k in range(count):
+        dx, dy, dz = a3 - k3[k], b3 - k7[k], c3 - k11[k]
+        trace = (
+            a0 * k0[k] + a1 * k1[k] + a2 * k2[k]
+            + b0 * k4[k] + b1 * k5[k] + b2 * k6[k]
+            + c0 * k8[k] + c1 * k9[k] + c2 * k10[k]
+        )  # fmt: skip
+        distance = (dx * dx + dy * dy + dz * dz) * per_translation
+        nearest = min(nearest, distance + squared_angle_of(trace) * per_rotation)
+    return nearest
 
 
 @njit(**FAST)

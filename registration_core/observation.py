@@ -19,6 +19,9 @@ ALIGNMENT = 8
 NEAREST = 0.15
 """Metres; the window is computed as if nothing could come nearer to the camera than this."""
 
+FARTHEST = 100.0
+"""Metres; what is measured beyond counts as not measured."""
+
 
 class Grid(NamedTuple):
     """A reduced depth image as kernels take it; the outermost pixels are always 0, "not measured"."""
@@ -92,12 +95,29 @@ def observe(
     rng: np.random.Generator,
 ) -> Observation:
     """Read the depth image (H, W), metres, around an object expected at `centre` (3,), camera axes."""
-    radius = model.radius
-    left, top, right, bottom = window(camera, centre, radius, config.reach)
-    block = reduction(camera, model.diameter, float(centre[2]), config.pixels_across, 4)
+    bounds = window(camera, centre, model.radius, config.reach)
+    return observe_region(depth, camera, bounds, float(centre[2]), model, config, rng)
+
+
+def observe_region(
+    depth: NDArray[np.float32],
+    camera: Intrinsics,
+    bounds: tuple[int, int, int, int],
+    distance: float,
+    model: ViewpointModel,
+    config: ObservationConfig,
+    rng: np.random.Generator,
+) -> Observation:
+    """Read the part (left, top, right, bottom) of the depth image (H, W), metres, in which an object is about
+    `distance` [m] off.
+    """
+    left, top, right, bottom = bounds
+    block = reduction(camera, model.diameter, distance, config.pixels_across, 4)
     rows, columns = max(bottom - top, 0) // block, max(right - left, 0) // block
     reduced = np.zeros((rows + 2, columns + 2), np.float32)
-    _reduce(depth[top:bottom, left:right], block, f4(config.depth_gap), reduced)
+    part = depth[top:bottom, left:right]
+    measured = np.where((part > 0) & (part < FARTHEST), part, f4(0))  # NaN is neither
+    _reduce(measured, block, f4(config.depth_gap), reduced)
     # a block's centre lies (block - 1) / 2 pixels beyond its first pixel; the border shifts the grid by one
     fx, fy = f4(camera.fx / block), f4(camera.fy / block)
     cx = f4((camera.cx - left - (block - 1) / 2) / block + 1)
@@ -107,75 +127,91 @@ def observe(
     weight = np.ones_like(reduced)
     grid = Grid(reduced, normals, weight, fx, fy, cx, cy)
     plane = _find_plane(grid, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
-    silhouette = model.mean_area * float(fx) * float(fy) / max(float(centre[2]), NEAREST) ** 2
+    silhouette = model.mean_area * float(fx) * float(fy) / max(distance, NEAREST) ** 2
     least = max(config.plane_share, config.plane_excess * silhouette / max(int(np.count_nonzero(reduced)), 1))
     if plane[4] > least:
         _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
-    near = np.abs(reduced - centre[2]) < radius + config.reach
+    near = np.abs(reduced - distance) < model.radius + config.reach
     return Observation(grid, block, int(np.count_nonzero(near & (reduced > 0))))
 
 
 @njit(**FAST)
 def _reduce(depth, block, gap, out):
-    """Mean of each block over the pixels within `gap` of its nearest one; `out` has a border of 1."""
+    """Mean of each block over the pixels within `gap` of its nearest one; `out` has a border of 1.
+
+    A whole row of blocks is carried along together: the inner loops are then vectorised.
+    """
+    columns = out.shape[1] - 2
+    far = f4(1e9)
+    nearest, total, count = np.empty((3, columns), np.float32)
     for i in range(out.shape[0] - 2):
-        for j in range(out.shape[1] - 2):
-            nearest = f4(1e9)
-            for a in range(block):
-                for b in range(block):
+        nearest[:], total[:], count[:] = far, f4(0), f4(0)
+        for a in range(block):
+            for b in range(block):
+                for j in range(columns):
                     z = depth[i * block + a, j * block + b]
-                    if z > 0:
-                        nearest = min(nearest, z)
-            total, count = f4(0), f4(0)
-            for a in range(block):
-                for b in range(block):
+                    nearest[j] = min(nearest[j], z if z > f4(0) else far)
+        for a in range(block):
+            for b in range(block):
+                for j in range(columns):
                     z = depth[i * block + a, j * block + b]
-                    if z > 0 and z - nearest < gap:
-                        total += z
-                        count += f4(1)
-            out[i + 1, j + 1] = total / count if count > 0 else f4(0)
+                    m = f4(1) if z > f4(0) and z - nearest[j] < gap else f4(0)
+                    total[j] += m * z
+                    count[j] += m
+        for j in range(columns):
+            out[i + 1, j + 1] = total[j] / max(count[j], f4(1))
 
 
 @njit(**FAST)
 def _fit_normals(depth, fx, fy, cx, cy, radius, gap, out):
-    """Normals towards the camera by least squares of z = a + b du + c dv over neighbours within `gap`."""
+    """Normals towards the camera by least squares of z = a + b du + c dv over neighbours within `gap`.
+
+    The sums of a whole row of pixels are carried along together: the inner loop is then vectorised.
+    """
     height, width = depth.shape
+    sums = np.empty((9, width), np.float32)
+    n, su, sv, suu, svv, suv, sz, suz, svz = sums
     for i in range(radius, height - radius):
-        for j in range(radius, width - radius):
-            z = depth[i, j]
-            if z <= f4(0):
-                continue
-            n = su = sv = suu = svv = suv = sz = suz = svz = f4(0)
-            for a in range(-radius, radius + 1):
-                for b in range(-radius, radius + 1):
-                    d = depth[i + a, j + b] - z
+        sums[:] = f4(0)
+        centre = depth[i]
+        for a in range(-radius, radius + 1):
+            neighbours, v = depth[i + a], f4(a)
+            for b in range(-radius, radius + 1):
+                u = f4(b)
+                uu, vv, uv = u * u, v * v, u * v
+                for j in range(radius, width - radius):
+                    d = neighbours[j + b] - centre[j]
                     m = f4(1) if abs(d) < gap else f4(0)
-                    u, v, d = f4(b) * m, f4(a) * m, d * m
-                    n += m
-                    su += u
-                    sv += v
-                    suu += u * u
-                    svv += v * v
-                    suv += u * v
-                    sz += d
-                    suz += u * d
-                    svz += v * d
-            if n < f4(6):
+                    d *= m
+                    n[j] += m
+                    su[j] += u * m
+                    sv[j] += v * m
+                    suu[j] += uu * m
+                    svv[j] += vv * m
+                    suv[j] += uv * m
+                    sz[j] += d
+                    suz[j] += u * d
+                    svz[j] += v * d
+        y = (f4(i) - cy) / fy
+        for j in range(radius, width - radius):
+            z = centre[j]
+            if z <= f4(0) or n[j] < f4(6):
                 continue
-            suu -= su * su / n
-            svv -= sv * sv / n
-            suv -= su * sv / n
-            suz -= su * sz / n
-            svz -= sv * sz / n
-            determinant = suu * svv - suv * suv
-            if determinant < f4(1e-3) * n:
+            per_count = f4(1) / n[j]
+            duu = suu[j] - su[j] * su[j] * per_count
+            dvv = svv[j] - sv[j] * sv[j] * per_count
+            duv = suv[j] - su[j] * sv[j] * per_count
+            duz = suz[j] - su[j] * sz[j] * per_count
+            dvz = svz[j] - sv[j] * sz[j] * per_count
+            determinant = duu * dvv - duv * duv
+            if determinant < f4(1e-3) * n[j]:
                 continue
-            zu = (suz * svv - svz * suv) / determinant
-            zv = (svz * suu - suz * suv) / determinant
-            x, y = (f4(j) - cx) / fx, (f4(i) - cy) / fy
-            ax, ay = z / fx + x * zu, y * zu
-            bx, by = x * zv, z / fy + y * zv
-            nx, ny, nz = ay * zv - zu * by, zu * bx - ax * zv, ax * by - ay * bx
+            zu = (duz * dvv - dvz * duv) / determinant
+            zv = (dvz * duu - duz * duv) / determinant
+            x = (f4(j) - cx) / fx
+            ax, ay, az = z / fx + x * zu, y * zu, zu
+            bx, by, bz = x * zv, z / fy + y * zv, zv
+            nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
             scale = f4(1) / np.sqrt(nx * nx + ny * ny + nz * nz + f4(1e-20))
             if nx * x + ny * y + nz > f4(0):
                 scale = -scale

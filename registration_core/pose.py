@@ -76,9 +76,11 @@ def mean(T: Array, weights: ArrayLike | None = None) -> Array:
 
 
 def orthonormalised(T: Array) -> Array:
-    """The rigid pose nearest to T (4, 4), which is rigid up to rounding."""
-    u, _, v = np.linalg.svd(T[:3, :3])
-    return from_rotation_translation(u @ v, T[:3, 3])
+    """The rigid poses nearest to T (..., 4, 4), which are rigid up to rounding."""
+    u, _, v = np.linalg.svd(T[..., :3, :3])
+    rigid = T.copy()
+    rigid[..., :3, :3] = u @ v
+    return rigid
 
 
 def perturbed(T: Array, translation: float, rotation: float, rng: np.random.Generator) -> Array:

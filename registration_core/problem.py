@@ -1,5 +1,6 @@
 """The inputs of a snap: checked, and brought into the form that the search works on."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,14 @@ Array = NDArray[np.float64]
 
 FARTHEST = 30.0
 """Metres; a median depth beyond this is taken for millimetres."""
+
+
+class OutOfViewError(ValueError):
+    """The pose puts the object wholly outside the image."""
+
+
+SAMPLE = 5_000
+"""Pixels by which the unit of a depth image is told."""
 
 LEAST_SPREAD = (0.003, np.radians(3.0))
 """Metres and radians: no start is trusted more than this."""
@@ -38,6 +47,8 @@ class Problem:
     start: Array
     """(4, 4), the same as `T_camera_centre`."""
     prior: Prior
+    search: Prior
+    """The same, as wide as proposals are drawn."""
     config: SnapConfig
 
     def uncentred(self, T_camera_centre: Array) -> Array:
@@ -67,8 +78,8 @@ def checked_problem(
     viewpoints = viewpoint_model(model)
     start = centred(T, viewpoints.centre)
     check_in_view(viewpoints, camera, start)
-    prior = _prior(start, config.spread, start_spread)
-    return Problem(viewpoints, image, camera, T, start, prior, config)
+    prior, search = _priors(start, config.spread, start_spread)
+    return Problem(viewpoints, image, camera, T, start, prior, search, config)
 
 
 def region_of_interest(
@@ -91,7 +102,7 @@ def region_of_interest(
 
 
 def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
-    """The depth image (H, W) as float32 metres; what is not finite or not positive counts as not measured.
+    """The depth image (H, W) as float32; what is not a positive number in it counts as not measured.
 
     Raises:
         ValueError: where its shape is not the camera's, it holds no depth, or it seems to be in millimetres.
@@ -105,13 +116,17 @@ def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
             f"depth must have the shape (height, width) of the camera, {(camera.height, camera.width)};"
             f" it has {image.shape}"
         )
-    measured = np.isfinite(image) & (image > 0)
-    if not measured.any():
+    step = max(1, math.isqrt(image.size // SAMPLE))
+    sample = image[step // 2 :: step, step // 2 :: step]
+    measured = sample[np.isfinite(sample) & (sample > 0)]
+    if not len(measured):
+        measured = image[np.isfinite(image) & (image > 0)]
+    if not len(measured):
         raise ValueError("depth must hold measurements; all of its pixels are 0")
-    median = float(np.median(image[measured][:: max(1, int(measured.sum()) // 10_000)]))
+    median = float(np.median(measured))
     if median > FARTHEST:
         raise ValueError(f"depth must be in metres; its median is {median:.6g}, which looks like millimetres")
-    return image if measured.all() else np.where(measured, image, np.float32(0))
+    return image
 
 
 def check_in_view(model: ViewpointModel, camera: Intrinsics, start: Array) -> None:
@@ -125,16 +140,21 @@ def check_in_view(model: ViewpointModel, camera: Intrinsics, start: Array) -> No
         inside_rows = rows.max() > -0.5 and rows.min() < camera.height - 0.5
         if inside_columns and inside_rows:
             return
-    raise ValueError("T_camera_object puts the object wholly outside the image")
+    raise OutOfViewError("T_camera_object puts the object wholly outside the image")
 
 
-def _prior(start: Array, config: SpreadConfig, start_spread: tuple[float, float] | None) -> Prior:
-    translation, rotation = config.translation, config.rotation
+def _priors(
+    start: Array, config: SpreadConfig, start_spread: tuple[float, float] | None
+) -> tuple[Prior, Prior]:
+    """What is believed of the start, and how wide the search is."""
+    spread, belief = np.array([config.translation, config.rotation]), config.belief
     if start_spread is not None:
-        values = np.asarray(start_spread, dtype=np.float64)
-        if values.shape != (2,) or not np.isfinite(values).all() or (values < 0).any():
+        spread, belief = np.asarray(start_spread, dtype=np.float64), 1.0
+        if spread.shape != (2,) or not np.isfinite(spread).all() or (spread < 0).any():
             raise ValueError(
                 f"start_spread must be (metres, radians), neither negative; it is {start_spread!r}"
             )
-        translation, rotation = np.maximum(values, LEAST_SPREAD)
-    return Prior(to_rows(start)[0], f4(translation), f4(rotation))
+        spread = np.maximum(spread, LEAST_SPREAD)
+    rows = to_rows(start)[0]
+    prior, search = (factor * spread.astype(np.float32) for factor in (f4(belief), f4(config.search)))
+    return Prior(rows, *prior), Prior(rows, *search)

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs
-"""Where a snap looks first: Gaussian draws about the start, most of them put onto the observed surface."""
+"""Where the search looks first: about the operator's pose, or, without one, all over the observed surface."""
 
 import numpy as np
 from numba import njit
@@ -10,18 +10,18 @@ from registration_core.observation import Grid
 from registration_core.snap_config import ProposalConfig
 
 
-def propose(
+def around_start(
     prior: Prior,
-    search: float,
     surface: Surface,
     grid: Grid,
     config: ProposalConfig,
+    count: int,
     rng: np.random.Generator,
 ) -> Array32:
-    """Poses (N, 3, 4), the start first, spread `search` times as wide as the prior."""
-    poses = np.empty((config.count, 3, 4), np.float32)
-    _propose(
-        prior.start, f4(prior.translation * search), f4(prior.rotation * search), np.array(config.scales,
+    """Poses (count, 3, 4), the start first, spread as the prior is wide."""
+    poses = np.empty((count, 3, 4), np.float32)
+    _around_start(
+        prior.start, prior.translation, prior.rotation, np.array(config.scales,
         np.float32), f4(config.gaussian_share), f4(config.ray_share), f4(config.max_shift),
         f4(config.max_turn), config.tries, surface, grid, random_state(rng), poses,
     )  # fmt: skip
@@ -29,7 +29,7 @@ def propose(
 
 
 @njit(**FAST)
-def _propose(  # noqa: PLR0915 - one loop, for speed
+def _around_start(  # noqa: PLR0915 - one loop, for speed
     start,
     translation,
     rotation,
@@ -102,6 +102,46 @@ def _propose(  # noqa: PLR0915 - one loop, for speed
         T[0, 3] = (f4(column) - cx) / fx * seen - x
         T[1, 3] = (f4(row) - cy) / fy * seen - y
         T[2, 3] = seen - z
+
+
+def anywhere(surface: Surface, grid: Grid, count: int, rng: np.random.Generator) -> Array32:
+    """Poses (count, 3, 4), each with a point of the model on a pixel off the plane, normal on normal, turned
+    about it at random; none where no pixel has a normal.
+    """
+    pixels = np.argwhere((grid.weight > 0.5) & (grid.normals != 0.0).any(axis=0)).astype(np.int32)
+    poses = np.empty((count if len(pixels) else 0, 3, 4), np.float32)
+    _anywhere(pixels, surface, grid, random_state(rng), poses)
+    return poses
+
+
+@njit(**FAST)
+def _anywhere(pixels, surface, grid, state, out):
+    T = np.zeros((3, 4), np.float32)
+    turned = np.zeros((3, 4), np.float32)
+    for i in range(out.shape[0]):
+        row, column = pixels[int(uniform(state) * pixels.shape[0])]
+        seen = grid.depth[row, column]
+        view = int(uniform(state) * surface.points.shape[0])
+        k = int(uniform(state) * surface.points.shape[2])
+        T[:] = f4(0)
+        T[0, 0] = T[1, 1] = T[2, 2] = f4(1)
+        a, b, c = surface.normals[view, 0, k], surface.normals[view, 1, k], surface.normals[view, 2, k]
+        ox, oy, oz = grid.normals[0, row, column], grid.normals[1, row, column], grid.normals[2, row, column]
+        ax, ay, az = b * oz - c * oy, c * ox - a * oz, a * oy - b * ox
+        sine = np.sqrt(ax * ax + ay * ay + az * az)
+        angle = np.arctan2(sine, a * ox + b * oy + c * oz)
+        if sine < f4(1e-4):  # parallel or opposite: any axis across will do
+            ax, ay, az = (b, -a, f4(0)) if abs(c) < f4(0.9) else (f4(0), c, -b)
+            sine = np.sqrt(ax * ax + ay * ay + az * az)
+        share = angle / sine
+        turn(T, ax * share, ay * share, az * share, turned)
+        spin = f4(2 * np.pi) * uniform(state)
+        turn(turned, ox * spin, oy * spin, oz * spin, T)
+        x, y, z = turned_vector(T, surface.points[view, :, k])
+        out[i] = T
+        out[i, 0, 3] = (f4(column) - grid.cx) / grid.fx * seen - x
+        out[i, 1, 3] = (f4(row) - grid.cy) / grid.fy * seen - y
+        out[i, 2, 3] = seen - z
 
 
 @njit(**FAST, inline="always")

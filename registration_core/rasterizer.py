@@ -37,38 +37,50 @@ def draw_mesh(vertices, faces, fx, fy, cx, cy, inverse_depth, nearest_face, both
     Args:
         vertices: (V, 3), metres, camera axes.
         faces: (F, 3), indices of vertices.
+        inverse_depth: float32 or float64.
         nearest_face: (H, W) int32, set to the index of the face that is seen, or None.
         both_sides: False for a closed mesh wound counter-clockwise seen from outside, of which only front
             sides can be seen: half of the work.
+
+    Returns:
+        (top, bottom, left, right) of the pixels that may have been drawn on, the ends exclusive.
     """
-    pixels = np.empty((vertices.shape[0], 3))
+    height, width = inverse_depth.shape
+    x, y, q = np.empty((3, vertices.shape[0]))
+    left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
+    in_front = True
     for v in range(vertices.shape[0]):
-        z = vertices[v, 2]
-        q = 1.0 / z if z >= NEAR else 0.0
-        pixels[v, 0] = fx * vertices[v, 0] * q + cx
-        pixels[v, 1] = fy * vertices[v, 1] * q + cy
-        pixels[v, 2] = q
+        if vertices[v, 2] < NEAR:
+            x[v] = y[v] = q[v] = 0.0
+            in_front = False
+            continue
+        q[v] = 1.0 / vertices[v, 2]
+        x[v] = fx * vertices[v, 0] * q[v] + cx
+        y[v] = fy * vertices[v, 1] * q[v] + cy
+        left, right = min(left, x[v]), max(right, x[v])
+        top, bottom = min(top, y[v]), max(bottom, y[v])
     for f in range(faces.shape[0]):
         i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        a, b, c = pixels[i], pixels[j], pixels[k]
-        if a[2] > 0.0 and b[2] > 0.0 and c[2] > 0.0:
+        if in_front or (q[i] > 0.0 and q[j] > 0.0 and q[k] > 0.0):
             draw_triangle(
-                a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], inverse_depth, nearest_face, f,
+                x[i], y[i], q[i], x[j], y[j], q[j], x[k], y[k], q[k], inverse_depth, nearest_face, f,
                 both_sides,
             )  # fmt: skip
-        elif a[2] > 0.0 or b[2] > 0.0 or c[2] > 0.0:
+        elif q[i] > 0.0 or q[j] > 0.0 or q[k] > 0.0:
             corners, count = clip_to_near_plane(vertices[i], vertices[j], vertices[k])
             for n in range(count):
-                q = 1.0 / corners[n, 2]
-                corners[n, 0] = fx * corners[n, 0] * q + cx
-                corners[n, 1] = fy * corners[n, 1] * q + cy
-                corners[n, 2] = q
+                corners[n, 2] = 1.0 / corners[n, 2]
+                corners[n, 0] = fx * corners[n, 0] * corners[n, 2] + cx
+                corners[n, 1] = fy * corners[n, 1] * corners[n, 2] + cy
             for n in range(2, count):
                 a, b, c = corners[0], corners[n - 1], corners[n]
                 draw_triangle(
                     a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2], inverse_depth, nearest_face,
                     f, both_sides,
                 )  # fmt: skip
+    if not in_front:  # what is clipped may reach anywhere
+        return 0, height, 0, width
+    return (*pixels_between(top, bottom, height), *pixels_between(left, right, width))
 
 
 @njit(**EXACT)
@@ -94,25 +106,43 @@ def clip_to_near_plane(a, b, c):
 def draw_triangle(xa, ya, qa, xb, yb, qb, xc, yc, qc, inverse_depth, nearest_face, f, both_sides):
     """Draw one triangle given by pixels (x, y) and inverse depths q, which are linear across the image.
 
-    An edge shared by two triangles gives the same numbers in both, so that no crack opens between them.
+    An edge function is positive on the inner side of its edge; it is computed once and then grows by the same
+    from pixel to pixel. Rounding must not open a crack between two triangles that share an edge, so that a
+    pixel counts as inside down to `slack`.
     """
     area = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya)
-    if area == 0.0 or (area > 0.0 and not both_sides):  # rows grow downwards: fronts have negative area
+    if area > 0.0 and not both_sides:  # rows grow downwards: fronts have negative area
         return
-    side = 1.0 if area > 0.0 else -1.0
+    x_low, x_high, y_low, y_high = min(xa, xb, xc), max(xa, xb, xc), min(ya, yb, yc), max(ya, yb, yc)
+    extent = (x_high - x_low) * (y_high - y_low)  # no product in an edge function is larger
     height, width = inverse_depth.shape
-    left = int(np.ceil(max(0.0, min(xa, xb, xc))))
-    right = int(np.floor(min(width - 1.0, max(xa, xb, xc))))
-    top = int(np.ceil(max(0.0, min(ya, yb, yc))))
-    bottom = int(np.floor(min(height - 1.0, max(ya, yb, yc))))
-    for y in range(top, bottom + 1):
-        for x in range(left, right + 1):
-            wa = (xb - x) * (yc - y) - (xc - x) * (yb - y)
-            wb = (xc - x) * (ya - y) - (xa - x) * (yc - y)
-            wc = (xa - x) * (yb - y) - (xb - x) * (ya - y)
-            if wa * side >= 0.0 and wb * side >= 0.0 and wc * side >= 0.0:
-                q = (wa * qa + wb * qb + wc * qc) / area
-                if q > inverse_depth[y, x]:
-                    inverse_depth[y, x] = q
-                    if nearest_face is not None:
-                        nearest_face[y, x] = f
+    left, right = pixels_between(x_low, x_high, width)
+    top, bottom = pixels_between(y_low, y_high, height)
+    if left >= right or top >= bottom or abs(area) <= 1e-9 * extent:
+        return
+    slack = -1e-12 * extent
+    side = 1.0 if area > 0.0 else -1.0
+    dxa, dxb, dxc = (yb - yc) * side, (yc - ya) * side, (ya - yb) * side
+    dya, dyb, dyc = (xc - xb) * side, (xa - xc) * side, (xb - xa) * side
+    wa = ((xb - left) * (yc - top) - (xc - left) * (yb - top)) * side
+    wb = ((xc - left) * (ya - top) - (xa - left) * (yc - top)) * side
+    wc = ((xa - left) * (yb - top) - (xb - left) * (ya - top)) * side
+    per_area = 1.0 / abs(area)
+    q = (wa * qa + wb * qb + wc * qc) * per_area
+    dxq = (dxa * qa + dxb * qb + dxc * qc) * per_area
+    dyq = (dya * qa + dyb * qb + dyc * qc) * per_area
+    for j in range(bottom - top):
+        va, vb, vc, vq = wa + j * dya, wb + j * dyb, wc + j * dyc, q + j * dyq
+        nearest = inverse_depth[top + j, left:right]
+        for i in range(len(nearest)):  # without branches, which a processor cannot foresee here
+            inside = (va + i * dxa >= slack) & (vb + i * dxb >= slack) & (vc + i * dxc >= slack)
+            shown = inside & (vq + i * dxq > nearest[i])
+            nearest[i] = vq + i * dxq if shown else nearest[i]
+            if nearest_face is not None:
+                nearest_face[top + j, left + i] = f if shown else nearest_face[top + j, left + i]
+
+
+@njit(**EXACT)
+def pixels_between(low, high, size):
+    """(first, end) of the pixels along an axis of the image that lie in [low, high]."""
+    return int(np.ceil(min(max(low, 0.0), size))), int(np.floor(max(min(high, size - 1.0), -1.0))) + 1

@@ -3,15 +3,19 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from registration_core.agreement import Surface, agreement_weights, sparse_agreement
 from registration_core.kernels import Array32, f4
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.observation import Observation
-from registration_core.polish import polish
+from registration_core.polish import FINAL_TUKEY, polish, systems
 from registration_core.problem import Problem
-from registration_core.proposals import propose
+from registration_core.proposals import around_start
+from registration_core.selection import Judgement, judge
 from registration_core.snap_config import StageConfig
+
+Array = NDArray[np.float64]
 
 NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
 """Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
@@ -36,15 +40,19 @@ class Search:
     def proposals(self) -> tuple[Array32, Array32]:
         """The best proposals (N, 3, 4), best first, and their agreement (N,)."""
         config = self.problem.config
-        poses = propose(
-            self.problem.prior, config.spread.search, self.surface, self.observation.grid, config.proposals,
-            self.rng
-        )  # fmt: skip
+        search, spread = self.problem.search, config.spread
+        widest = spread.search**2 * spread.translation * spread.rotation
+        share = float(search.translation * search.rotation) / widest
+        count = int(min(1.0, max(config.proposals.least_share, share)) * config.proposals.count)
+        poses = around_start(search, self.surface, self.observation.grid, config.proposals, count, self.rng)
+        return ranked(poses, self.weighed(poses), config.wide_kept)
+
+    def weighed(self, poses: Array32) -> Array32:
+        """Agreement (N,) of proposals (N, 3, 4), of which none is exact yet."""
+        config = self.problem.config
         ring = self.surface.ring.shape[2] // 4
-        scores = self._agreement(
-            poses, config.wide_points, ring, config.wide_epsilon, config.agreement.wide_softening, False
-        )
-        return ranked(poses, scores, config.wide_kept)
+        softening = config.agreement.wide_softening
+        return self._agreement(poses, config.wide_points, ring, config.wide_epsilon, softening, False)
 
     def refined(self, poses: Array32, scores: Array32, stage: StageConfig) -> tuple[Array32, Array32]:
         """The distinct modes among poses (N, 3, 4), polished and weighed anew, best first."""
@@ -77,6 +85,19 @@ class Search:
             ]
         )  # fmt: skip
 
+    def judged(self, candidates: Array32, near: int) -> Judgement:
+        """The winner among candidates (N, 3, 4): the start, `near` polishes of it, and other modes."""
+        problem = self.problem
+        self.evaluations += len(candidates)
+        return judge(
+            candidates, near, problem.model, self.observation.grid, problem.prior, problem.config.selection
+        )
+
+    def hessian(self, T: Array32) -> Array:
+        """How firmly the depth holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""
+        points, radius = self.surface.points.shape[2], self.problem.model.radius
+        return systems(T[None], self.surface, self.observation.grid, radius, points, FINAL_TUKEY)[0][0]
+
     def _at_most(self, points: int) -> int:
         return min(points, self.surface.points.shape[2])
 
@@ -94,5 +115,8 @@ class Search:
 
 def ranked(poses: Array32, scores: Array32, most: int) -> tuple[Array32, Array32]:
     """The `most` best poses (N, 3, 4) and their scores, best first."""
-    order = np.argsort(-scores, kind="stable")[:most]
+    order = np.arange(len(scores))
+    if most < len(scores):
+        order = np.sort(np.argpartition(-scores, most)[:most])  # in order of their drawing, for ties
+    order = order[np.argsort(-scores[order], kind="stable")]
     return poses[order], scores[order]

@@ -17,19 +17,18 @@ from registration_core import pose
 from registration_core.agreement import surface_of
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, SnapStep
-from registration_core.kernels import to_rows
+from registration_core.kernels import f4, to_rows
 from registration_core.likelihood import RenderedLikelihood
-from registration_core.object_model import ObjectModel
+from registration_core.object_model import ObjectModel, discrete
 from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
-from registration_core.problem import checked_problem, region_of_interest
+from registration_core.problem import checked_problem
 from registration_core.rasterizer import render_depth
 from registration_core.report import nothing_seen, outcome, progress, verdict
 from registration_core.search import Search
-from registration_core.selection import judge
+from registration_core.seeding import seed_of
+from registration_core.selection import is_settled
 from registration_core.snap_config import ParticleFilterConfig, SnapConfig
-
-__all__ = ["region_of_interest", "seed_of", "snap", "snap_steps", "warm_up"]
 
 
 def snap(
@@ -88,21 +87,24 @@ def snap_steps(
 
 
 def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
-    """The fast method: propose, then anneal and polish ever fewer modes, then choose."""
-    config, prior = search.problem.config, search.problem.prior
-    iterations = len(config.stages) + 2
+    """The fast method: polish the start; where that does not settle it, propose, then anneal and polish ever
+    fewer modes, then choose.
+    """
+    config = search.problem.config
+    iterations = len(config.stages) + 3
+    near = np.concatenate([search.problem.prior.start[None], search.polished_start()])
+    judgement = search.judged(near, len(near) - 1)
+    if is_settled(judgement, near, config.selection):
+        yield verdict(search, 1, near, judgement)
+        return
+    yield progress(search, 1, iterations, near)
     poses, scores = search.proposals()
-    yield progress(search, 1, iterations, poses[:625])
-    for iteration, stage in enumerate(config.stages, start=2):
+    yield progress(search, 2, iterations, poses[:625])
+    for iteration, stage in enumerate(config.stages, start=3):
         poses, scores = search.refined(poses, scores, stage)
         yield progress(search, iteration, iterations, poses)
-    near = search.polished_start()
-    candidates = np.concatenate([prior.start[None], near, poses])
-    judgement = judge(
-        candidates, len(near), search.problem.model, search.observation.grid, prior, config.selection
-    )
-    search.evaluations += len(candidates)
-    yield verdict(search, iterations, candidates, judgement)
+    candidates = np.concatenate([near, poses])
+    yield verdict(search, iterations, candidates, search.judged(candidates, len(near) - 1))
 
 
 def _filter_steps(search: Search) -> Iterator[SnapStep]:
@@ -127,29 +129,21 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
             yield outcome(search, iteration, ranked, particles.log_weights[order])
 
 
-def seed_of(rng: np.random.Generator | None) -> int:
-    """A seed s such that a snap with `default_rng(s)` does the same as one with `rng`.
-
-    A generator that comes fresh from `default_rng(s)` has the seed s; from any other one a seed is drawn.
-    """
-    if rng is None:
-        return int(np.random.default_rng().integers(2**53))
-    drawn = int(rng.integers(2**53))
-    entropy = getattr(rng.bit_generator.seed_seq, "entropy", None)
-    if isinstance(entropy, int) and entropy < 2**64:
-        fresh = np.random.default_rng(entropy)
-        if int(fresh.integers(2**53)) == drawn and fresh.bit_generator.state == rng.bit_generator.state:
-            return entropy
-    return drawn
-
-
 def warm_up() -> None:
-    """Compile or load every kernel by a tiny snap of each method, so that the first real one is fast."""
+    """Compile or load every kernel by a few tiny snaps, so that the first real one is fast.
+
+    They meet what any snap may meet: a supporting plane, a symmetry, depth that is cropped or taken whole.
+    """
     box = trimesh.creation.box((0.08, 0.05, 0.03))
-    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32))
-    camera = Intrinsics(160, 120, 150.0, 150.0, 79.5, 59.5)
+    half_turn = discrete([np.diag([-1.0, -1.0, 1.0, 1.0])])
+    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, dtype=np.int32), half_turn)
+    camera = Intrinsics(320, 240, 150.0, 150.0, 159.5, 119.5)
     T = pose.exp([0.0, 0.0, 0.4, 0.5, 0.3, 0.0])
-    depth = render_depth(model, camera, T)
+    drawn = render_depth(model, camera, T)
+    depth = np.where(drawn > 0.0, drawn, f4(0.45))
     short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
     for config in (SnapConfig(), short):
-        snap(model, depth, camera, T, config, np.random.default_rng(0))
+        left, top, width, height = region_of_interest(model, camera, T, config)
+        part = np.ascontiguousarray(depth[top : top + height, left : left + width])
+        for image, seen_by in ((depth, camera), (part, camera.cropped(left, top, width, height))):
+            snap(model, image, seen_by, T, config, np.random.default_rng(0))

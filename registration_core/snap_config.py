@@ -38,14 +38,16 @@ class ObservationConfig:
 
 @dataclass(frozen=True)
 class SpreadConfig:
-    """How far off the start may be, where the caller does not say."""
+    """How far off the start may be, and how far the search goes."""
 
     translation: float = 0.04
-    """Metres."""
+    """Where the caller does not say, metres."""
     rotation: float = 0.5
-    """Radians."""
+    """Where the caller does not say, radians."""
     search: float = 1.4
     """Proposals are drawn this many times wider than that."""
+    belief: float = 0.5
+    """Where the caller does not say, the prior about the start is this much narrower: it may well be good."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,9 @@ class ProposalConfig:
     """The poses that a snap starts from."""
 
     count: int = 14_000
+    """Drawn where the start may be far off."""
+    least_share: float = 0.25
+    """Share of them drawn where the caller says that it is close."""
     gaussian_share: float = 0.1
     """Share drawn from the Gaussian about the start alone."""
     ray_share: float = 0.1
@@ -113,16 +118,50 @@ class StageConfig:
 class SelectionConfig:
     """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
 
-    prior: float = 2.25
+    prior: float = 1.79
     """Weight of the heavy-tailed prior about the start."""
-    gain_near: float = 0.5
+    gain_near: float = 1.5
     """The polished start replaces the start only if it scores better by this much."""
-    gain_far: float = 0.8
+    gain_far: float = 1.5
     """Another mode replaces that only if it scores better by this much."""
     min_match: float = 0.04
-    """With less of the silhouette matched than this, the start is kept."""
-    weights: tuple[float, ...] = (8.0, 1.5, 0.0, 3.3, 0.0, 0.5, 2.7, 5.4, 1.6, 0.65, 1.15, 3.15)
-    """Of the twelve residual classes of selection.py, in their order."""
+    """With less of the claimed surface matched than this, the start is kept."""
+    settled_match: float = 0.9
+    """With more of it matched by a polish of the start ..."""
+    settled_translation: float = 0.01
+    """... that moved no farther than this, metres, ..."""
+    settled_rotation: float = 0.13
+    """... and this, radians, nothing else is looked for."""
+    match_share: float = 7.1
+    """Weight of the share of the claimed surface that was measured where it is claimed."""
+    weights: tuple[float, ...] = (
+        1.0,
+        -14.3,
+        -15.3,
+        -12.2,
+        3.3,
+        -15.9,
+        -29.8,
+        -32.0,
+        -9.3,
+        -5.5,
+        -17.6,
+        -54.1,
+        -24.7,
+        -39.2,
+        -33.2,
+        -13.5,
+        -3.4,
+        20.0,
+        0.0,
+        0.0,
+        -20.9,
+        -12.5,
+        0.0,
+        -7.7,
+        4.4,
+    )
+    """Of the classes of evidence.py, in their order."""
 
 
 @dataclass(frozen=True)
@@ -156,14 +195,32 @@ class ParticleFilterConfig:
     """Standard deviation added to each axis after resampling, metres."""
     noise_rotation: float = 0.02
     """The same for the rotation vector, radians."""
-    pixels_across: int = 40
-    """Every 2nd, 4th or 8th pixel is used as long as the object's diameter still spans this many."""
+    silhouette_pixels: int = 600
+    """Every k-th column and row is used, as long as the mean silhouette still covers this many pixels."""
+
+
+ANYWHERE_STAGES = (
+    StageConfig(3000, 0.015, 0.25, 6, 0.03, 0.010, 96, 0.010),
+    StageConfig(400, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
+    StageConfig(100, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+)
+
+
+@dataclass(frozen=True)
+class AnywhereConfig:
+    """The search without a start (global_search.py)."""
+
+    count: int = 600_000
+    """Proposals."""
+    kept: int = 30_000
+    """Proposals of which the distinct modes are taken."""
+    stages: tuple[StageConfig, ...] = ANYWHERE_STAGES
 
 
 DEFAULT_STAGES = (
-    StageConfig(600, 0.015, 0.25, 4, 0.03, 0.012, 96, 0.010),
-    StageConfig(80, 0.008, 0.12, 6, 0.012, 0.005, 200, 0.006),
-    StageConfig(24, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+    StageConfig(900, 0.015, 0.25, 4, 0.03, 0.012, 64, 0.010),
+    StageConfig(120, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
+    StageConfig(40, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
 )
 
 
@@ -184,6 +241,7 @@ class SnapConfig:
     """Proposals of which the distinct modes are taken."""
     agreement: AgreementConfig = field(default_factory=AgreementConfig)
     stages: tuple[StageConfig, ...] = DEFAULT_STAGES
+    anywhere: AnywhereConfig = field(default_factory=AnywhereConfig)
     selection: SelectionConfig = field(default_factory=SelectionConfig)
     confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)
     particle_filter: ParticleFilterConfig = field(default_factory=ParticleFilterConfig)

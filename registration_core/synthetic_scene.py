@@ -157,13 +157,20 @@ class Silhouette:
     def _overlap(self, image: DepthImage) -> tuple[DepthImage, DepthImage]:
         """The parts of an image (H, W) and of this depth that lie on each other."""
         height, width = self.depth.shape
-        rows = slice(max(0, self.top), max(0, min(image.shape[0], self.top + height)))
-        columns = slice(max(0, self.left), max(0, min(image.shape[1], self.left + width)))
+        rows, columns = _within(self.top, height, image.shape[0]), _within(self.left, width, image.shape[1])
         part = self.depth[
             rows.start - self.top : rows.stop - self.top,
             columns.start - self.left : columns.stop - self.left,
         ]
         return image[rows, columns], part
+
+
+def _within(first: int, count: int, size: int) -> slice:
+    """The indices of `first`, ..., `first + count - 1` that lie in 0, ..., `size - 1`; empty where none
+    does.
+    """
+    start = max(0, first)
+    return slice(start, max(start, min(size, first + count)))
 
 
 def table_model() -> ObjectModel:

@@ -23,7 +23,7 @@ from registration_core.mesh_reduction import clustered, decimated, is_closed, me
 from registration_core.object_model import ObjectModel
 from registration_core.viewpoint_drawing import draw_views
 
-VERSION = 1
+VERSION = 2
 """Part of the cache file's name: raised when the content of the model changes."""
 
 POINTS, RING_POINTS = 256, 64
@@ -32,7 +32,7 @@ VIEW_SUBDIVISIONS = 3
 """Of an icosahedron: 642 directions about 7 degrees apart."""
 CELLS = 32
 """Cells along an edge of the cube map that finds the view of a direction."""
-COARSE_FACES = 600
+COARSE_FACES = 1000
 """Faces of the coarse mesh, at most, where decimation can reach it."""
 DENSE_FACES = 20_000
 """A mesh with more faces is thinned before its views are drawn: more could not be seen in them."""

@@ -1,6 +1,7 @@
 """Snaps: asking for one, how it stands, and cancelling it."""
 
-from typing import Any, Literal, cast
+from math import pi
+from typing import Annotated, Any, Literal, cast
 
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
@@ -9,6 +10,7 @@ from app.api.dependencies import IdentityDep, ServicesDep
 from app.api.problems import InputError
 from app.api.registrations import SeatDep
 from app.auth import Identity
+from app.labeling.start_spread import Unsaid
 from app.services import Services
 from app.tables import EstimateRow, Event, Pose
 from registration_core import SnapConfig
@@ -24,6 +26,9 @@ OUTCOMES: dict[str, SnapState] = {
 }
 INTERRUPTED = "The server stopped while this snap ran. Nothing is lost; ask for another one."
 
+Metres = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+Radians = Annotated[float, Field(ge=0, le=pi, allow_inf_nan=False)]
+
 
 class NewSnap(BaseModel):
     """How to snap; everything has a default."""
@@ -31,6 +36,12 @@ class NewSnap(BaseModel):
     seed: int | None = Field(None, ge=0, lt=2**63, description="For a result that can be repeated.")
     config: dict[str, Any] | None = Field(
         None, description='Changes to the default configuration, or {"preset": "paper"}.', examples=[{}]
+    )
+    start_spread: tuple[Metres, Radians] | None = Field(
+        default_factory=lambda: None,  # which OpenAPI does not show: left out is something else than null
+        description="How far off the present pose may be, metres and radians; null where that is unknown. "
+        "Left out, it is told from the last drags.",
+        examples=[[0.03, 0.35]],
     )
 
 
@@ -58,6 +69,7 @@ class EstimateOut(BaseModel):
     converged: bool
     seed: int
     config: dict[str, Any]
+    start_spread: list[float] | None
     version: str
     hardware: str
     seconds: float
@@ -83,7 +95,9 @@ def request_snap(seat: SeatDep, identity: IdentityDep, body: NewSnap | None = No
         config = SnapConfig.from_dict(wanted.config or {})
     except ValueError as error:
         raise InputError(f"config: {error}.") from error
-    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed))
+    given = "start_spread" in wanted.model_fields_set
+    spread = wanted.start_spread if given else Unsaid.FROM_DRAGS
+    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed, spread))
 
 
 @router.get("/snaps/{snap_id}")

@@ -1,10 +1,14 @@
 """Which degrees of freedom a drag used. A viser gizmo does not say which handle was held: the poses do."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from registration_core import pose
+
+Array = NDArray[np.float64]
 
 TRANSLATION_THRESHOLD = 1e-4
 """Metres; less than that is rounding on the way through the browser."""
@@ -12,10 +16,18 @@ ROTATION_THRESHOLD = 1e-3
 """Radians."""
 
 
-def degrees_of_freedom(
-    T_start: NDArray[np.float64], T_end: NDArray[np.float64], pivot: NDArray[np.float64]
-) -> tuple[str, ...]:
-    """Names among tx, ty, tz, rx, ry, rz, in the axes that the gizmo had when the drag began.
+@dataclass(frozen=True)
+class GizmoMotion:
+    """How a drag moved the gizmo, in the axes that it had when the drag began; what is mere rounding is 0."""
+
+    translation: Array
+    """(3,), metres."""
+    rotation: Array
+    """(3,), rotation vector, radians."""
+
+
+def gizmo_motion(T_start: Array, T_end: Array, pivot: Array) -> GizmoMotion:
+    """How the gizmo moved.
 
     Args:
         T_start: The object's pose (4, 4) before, in any frame.
@@ -25,6 +37,19 @@ def degrees_of_freedom(
     difference = pose.inverse(T_start) @ T_end
     translation = pose.apply(difference, pivot) - pivot
     rotation = Rotation.from_matrix(difference[:3, :3]).as_rotvec()
-    moved = [f"t{axis}" for axis, v in zip("xyz", translation, strict=True) if abs(v) > TRANSLATION_THRESHOLD]
-    turned = [f"r{axis}" for axis, v in zip("xyz", rotation, strict=True) if abs(v) > ROTATION_THRESHOLD]
-    return tuple(moved + turned)
+    return GizmoMotion(
+        np.where(np.abs(translation) > TRANSLATION_THRESHOLD, translation, 0.0),
+        np.where(np.abs(rotation) > ROTATION_THRESHOLD, rotation, 0.0),
+    )
+
+
+def degrees_of_freedom(T_start: Array, T_end: Array, pivot: Array) -> tuple[str, ...]:
+    """Names among tx, ty, tz, rx, ry, rz of what a `gizmo_motion` changed."""
+    motion = gizmo_motion(T_start, T_end, pivot)
+    changes = {"t": motion.translation, "r": motion.rotation}
+    return tuple(
+        f"{letter}{axis}"
+        for letter, change in changes.items()
+        for axis, amount in zip("xyz", change, strict=True)
+        if amount
+    )

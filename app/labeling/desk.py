@@ -24,7 +24,7 @@ from app.snapping import SnapError, Snapper
 from app.tables import EstimateRow, Frame, Registration, Scene, Task
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, pose
-from registration_core.snap import region_of_interest
+from registration_core.problem import region_of_interest
 
 logger = logging.getLogger(__name__)
 
@@ -237,6 +237,7 @@ class Desk:
             T_camera_object=T_camera_object,
             config=order.config,
             seed=order.seed,
+            start_spread=order.start_spread,
         )
 
     def _make_view(self, seat: Seat) -> SceneView:

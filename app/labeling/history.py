@@ -32,6 +32,8 @@ class Step:
     """(4, 4)."""
     confidence: float | None = None
     """Of the estimate that the pose stems from; None where a person set it."""
+    dragged: bool = False
+    """Whether an operator dragged the object here from the step before."""
 
 
 @dataclass(frozen=True)
@@ -82,5 +84,6 @@ def replay(T_start: NDArray[np.float64], events: Iterable[LoggedEvent]) -> Histo
         elif event.kind in NEW_POSE_KINDS:
             confidence = event.detail.get("confidence")
             T = np.array(event.T_after, dtype=np.float64)
-            history = history.pushed(Step(T, None if confidence is None else float(str(confidence))))
+            step = Step(T, None if confidence is None else float(str(confidence)), event.kind == "drag")
+            history = history.pushed(step)
     return history

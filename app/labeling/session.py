@@ -28,7 +28,9 @@ from app.labeling.snap_exchange import (
     SnapResult,
     SnapStatus,
     estimate_row,
+    stored_spread,
 )
+from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
 from app.tables import EstimateRow
 from registration_core import SnapConfig
 
@@ -167,7 +169,7 @@ class LabelingSession:
             event = drag.event(self._pivot)
             try:
                 if event is not None:
-                    self._push(event, Step(drag.T_now))
+                    self._push(event, Step(drag.T_now, dragged=True))
             except Exception as error:
                 self._message = f"The last drag could not be saved and was taken back: {error}"
                 raise
@@ -234,8 +236,20 @@ class LabelingSession:
 
     # -- the machine's hand ------------------------------------------------------------------------
 
-    def snap(self, actor: Actor, config: SnapConfig | None = None, seed: int | None = None) -> str:
+    def snap(
+        self,
+        actor: Actor,
+        config: SnapConfig | None = None,
+        seed: int | None = None,
+        start_spread: StartSpread | Unsaid | None = Unsaid.FROM_DRAGS,
+    ) -> str:
         """Ask the workers for a better pose from the present one; the newest request wins.
+
+        Args:
+            actor: Who asks.
+            config: `SnapConfig()` where it is None.
+            seed: A fresh one where it is None.
+            start_spread: How far off the present pose may be; None where that is unknown.
 
         Returns:
             The snap's id.
@@ -243,12 +257,19 @@ class LabelingSession:
         with self._lock:
             self._require_open()
             self._abandon_snap(actor, "superseded")
+            config = config or SnapConfig()
+            history = self._history
+            if self._drag is not None:  # it counts as if it ended now
+                history = history.pushed(Step(self._drag.T_now, dragged=True))
+            if start_spread is Unsaid.FROM_DRAGS:
+                start_spread = spread_from_drags(history, self._pivot, config.spread)
             order = SnapOrder(
                 snap_id=uuid.uuid4().hex,
                 frame_id=self._frame_id,
-                T_world_object=self._drag.T_now if self._drag else self._history.current.T_world_object,
-                config=config or SnapConfig(),
+                T_world_object=history.current.T_world_object,
+                config=config,
                 seed=secrets.randbelow(2**31) if seed is None else seed,
+                start_spread=start_spread,
             )
             self._record_event(
                 NewEvent(
@@ -256,7 +277,12 @@ class LabelingSession:
                     actor=actor,
                     T_before=order.T_world_object.tolist(),
                     snap_id=order.snap_id,
-                    detail={"seed": order.seed, "config": order.config.to_dict(), "frame_id": order.frame_id},
+                    detail={
+                        "seed": order.seed,
+                        "config": order.config.to_dict(),
+                        "start_spread": stored_spread(order.start_spread),
+                        "frame_id": order.frame_id,
+                    },
                 )
             )
             self._snap = SnapStatus(order.snap_id)

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.labeling.start_spread import StartSpread
 from app.tables import EstimateRow
 from registration_core import Estimate, SnapConfig
 
@@ -22,6 +23,8 @@ class SnapOrder:
     T_world_object: Array
     config: SnapConfig
     seed: int
+    start_spread: StartSpread | None
+    """How far off the pose may be; None where that is unknown."""
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,11 @@ class Offer:
     confidence: float
 
 
+def stored_spread(spread: StartSpread | None) -> list[float] | None:
+    """A spread as JSON keeps it."""
+    return None if spread is None else list(spread)
+
+
 def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> EstimateRow:
     """A result as it is kept, with all that is needed to repeat it."""
     estimate = result.estimate
@@ -96,6 +104,7 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         converged=estimate.converged,
         seed=order.seed,
         config=order.config.to_dict(),
+        start_spread=stored_spread(order.start_spread),
         version=result.version,
         hardware=result.hardware,
         seconds=estimate.seconds,

@@ -37,6 +37,7 @@ def new_job(
         "T_camera_object": START,
         "config": config or SnapConfig(),
         "seed": SEED,
+        "start_spread": None,
     }
     return SnapJob(**(fields | changes))
 
@@ -44,7 +45,7 @@ def new_job(
 def done_here(job: SnapJob, model: ObjectModel) -> Estimate:
     """What the same snap gives in this process."""
     rng = np.random.default_rng(job.seed)
-    return snap(model, job.depth, job.camera, job.T_camera_object, job.config, rng)
+    return snap(model, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread)
 
 
 def assert_same(a: Estimate, b: Estimate) -> None:

@@ -8,6 +8,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from alembic.script import ScriptDirectory
 from sqlalchemy import delete, func, select, text, update
 from sqlalchemy.exc import DBAPIError
 
@@ -20,12 +21,15 @@ from app.importing import import_dataset
 from app.storage import FileStore
 from app.tables import Base, Dataset, EstimateRow, Event, Registration, Task, User
 
-SECOND_REVISION = '''
+HEAD = ScriptDirectory(str(PROJECT / "migrations")).get_current_head()
+"""The revision of this version's tables."""
+
+LATER_REVISION = '''
 """A change of a later version."""
 from alembic import op
 
-revision = "0002"
-down_revision = "0001"
+revision = "later"
+down_revision = "{head}"
 
 
 def upgrade() -> None:
@@ -214,11 +218,11 @@ def test_the_log_can_only_grow(database, registration_id, table, column):
 
 
 @pytest.fixture
-def two_revisions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """This version becomes one that has a second migration."""
+def later_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """This version becomes one that has another migration."""
     project = tmp_path / "project"
     shutil.copytree(PROJECT / "migrations", project / "migrations")
-    (project / "migrations/versions/0002_later.py").write_text(SECOND_REVISION)
+    (project / "migrations/versions/later.py").write_text(LATER_REVISION.format(head=HEAD))
     monkeypatch.setattr(app.database, "PROJECT", project)
 
 
@@ -235,8 +239,8 @@ def test_an_empty_database_says_what_to_do(tmp_path):
     empty.close()
 
 
-def test_an_older_database_says_what_to_do_and_can_be_updated(database, two_revisions):
-    with pytest.raises(DatabaseError, match=r"older Snap6D \(revision 0001\); run `snap6d migrate`"):
+def test_an_older_database_says_what_to_do_and_can_be_updated(database, later_revision):
+    with pytest.raises(DatabaseError, match=rf"older Snap6D \(revision {HEAD}\); run `snap6d migrate`"):
         database.check_version()
     with database.write() as session:
         session.add(Dataset(name="kept"))
@@ -245,6 +249,37 @@ def test_an_older_database_says_what_to_do_and_can_be_updated(database, two_revi
     with database.read() as session:
         assert session.scalars(select(Dataset.name)).all() == ["kept"]
         assert session.scalars(text("SELECT * FROM later")).all() == []
+
+
+@pytest.fixture
+def first_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Database:
+    """A database as the first version left it: with an estimate made before anyone told a spread."""
+    project = tmp_path / "first"
+    shutil.copytree(PROJECT / "migrations", project / "migrations")
+    for later in (project / "migrations/versions").glob("0002*"):
+        later.unlink()
+    with monkeypatch.context() as patch:
+        patch.setattr(app.database, "PROJECT", project)
+        database = Database(f"sqlite:///{tmp_path / 'first.sqlite'}")
+        database.migrate()
+    with sqlite3.connect(path_of(database)) as connection:  # which does not check references
+        columns = connection.execute("PRAGMA table_info(estimates)").fetchall()
+        values = ", ".join({"JSON": "'[]'", "DATETIME": "'2026-01-01'"}.get(row[2], "1") for row in columns)
+        connection.execute(f"INSERT INTO estimates VALUES ({values})")
+    connection.close()
+    return database
+
+
+def test_estimates_of_the_first_version_stay_as_they_are_and_unknown_in_spread(first_version):
+    first_version.migrate()
+    first_version.check_version()
+    with first_version.read() as session:
+        (row,) = session.scalars(select(EstimateRow)).all()
+    assert row.start_spread is None
+    for statement in (update(EstimateRow).values(start_spread=[0.1, 0.1]), delete(EstimateRow)):
+        with pytest.raises(DBAPIError, match="append-only"), first_version.write() as session:
+            session.execute(statement)
+    first_version.close()
 
 
 def test_a_newer_database_is_left_alone(database):
@@ -257,9 +292,9 @@ def test_a_newer_database_is_left_alone(database):
         assert session.scalar(text("SELECT version_num FROM alembic_version")) == "9999"
 
 
-def test_a_migration_that_fails_leaves_nothing_behind(tmp_path, two_revisions):
-    second = app.database.PROJECT / "migrations/versions/0002_later.py"
-    second.write_text(SECOND_REVISION.replace("CREATE TABLE later (id INTEGER)", "CREATE NONSENSE"))
+def test_a_migration_that_fails_leaves_nothing_behind(tmp_path, later_revision):
+    later = app.database.PROJECT / "migrations/versions/later.py"
+    later.write_text(later.read_text().replace("CREATE TABLE later (id INTEGER)", "CREATE NONSENSE"))
     broken = Database(f"sqlite:///{tmp_path / 'new.sqlite'}")
     with pytest.raises(DBAPIError, match="NONSENSE"):
         broken.migrate()

@@ -10,7 +10,7 @@ from distributed import Client
 
 from app import worker
 from app.worker import SnapCancelledError
-from registration_core import ObjectModel, SnapConfig
+from registration_core import ObjectModel, SnapConfig, pose
 from tests.app.snap_jobs import T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
 from tests.app.waiting import LONGEST, wait_until
 
@@ -49,6 +49,30 @@ def test_it_finds_what_the_library_finds(client, addresses, model, config):
     assert_same(result.estimate, done_here(job, model))
     assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
     assert result.hardware
+
+
+@pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])
+def test_it_searches_as_far_as_it_is_told(client, addresses, model, method):
+    config = SnapConfig.from_dict({"method": method, "particle_filter": {"particles": 60, "iterations": 20}})
+    found = []
+    for spread in (None, (0.006, 0.1), (0.06, 1.0)):
+        job = new_job(model, config=config, start_spread=spread)
+        result = run(client, addresses[0], worker.run_snap, job, model)
+        assert_same(result.estimate, done_here(job, model))
+        found.append(result.estimate.confidence)
+    assert len(set(found)) == 3
+
+
+def test_told_too_little_it_does_not_find_what_lies_farther_off(client, addresses, model):
+    start = pose.perturbed(T_CAMERA_TOOL, 0.05, 0.6, np.random.default_rng(1))
+
+    def distance(spread: tuple[float, float]) -> float:
+        job = new_job(model, T_camera_object=start, start_spread=spread)
+        found = run(client, addresses[0], worker.run_snap, job, model).estimate.T_camera_object
+        return float(np.linalg.norm(found[:3, 3] - T_CAMERA_TOOL[:3, 3]))
+
+    assert distance((0.06, 1.0)) < 0.003
+    assert distance((0.006, 0.1)) > 0.03
 
 
 def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model):
@@ -94,6 +118,8 @@ def test_a_bad_job_is_refused_by_name(client, addresses, model):
     far[:3, 3] = [50.0, 0.0, 1.0]
     with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
         run(client, addresses[0], worker.run_snap, new_job(model, T_camera_object=far), model)
+    with pytest.raises(ValueError, match="start_spread must be"):
+        run(client, addresses[0], worker.run_snap, new_job(model, start_spread=(-1.0, 0.1)), model)
 
 
 def test_only_the_recent_objects_are_kept(monkeypatch):

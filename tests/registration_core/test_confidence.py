@@ -5,8 +5,8 @@ import pytest
 
 from registration_core import SnapConfig, pose
 from registration_core.confidence import confidence, mode_masses, modes_of
+from registration_core.evidence import COUNT, OFF_PLANE
 from registration_core.kernels import to_rows
-from registration_core.selection import Residual
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import tool
 
@@ -26,8 +26,8 @@ def test_mass_of_a_mode_is_that_of_its_best() -> None:
 
 
 def shares(match: float, seen_through: float) -> np.ndarray:
-    values = np.zeros(len(Residual))
-    values[Residual.MATCH], values[Residual.SEEN_THROUGH] = match, seen_through
+    values = np.zeros(COUNT)
+    values[OFF_PLANE + 4], values[OFF_PLANE + 8] = match, seen_through
     return values
 
 
@@ -41,4 +41,4 @@ def test_confidence_rises_with_mass_and_match() -> None:
 
 @pytest.mark.parametrize("mass", [0.0, 0.5, 1.0])
 def test_confidence_of_no_pixels_at_all_is_a_probability(mass) -> None:
-    assert 0.0 <= confidence(mass, np.zeros(len(Residual)), CONFIG) <= 1.0
+    assert 0.0 <= confidence(mass, np.zeros(COUNT), CONFIG) <= 1.0

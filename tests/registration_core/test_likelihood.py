@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 from registration_core import pose
 from registration_core.camera import depth_to_points
 from registration_core.kernels import centred
-from registration_core.likelihood import RenderedLikelihood
+from registration_core.likelihood import RenderedLikelihood, strides
 from registration_core.object_model import ObjectModel
 from registration_core.rasterizer import render_depth
 from registration_core.snap_config import ParticleFilterConfig
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import CAMERA, SimpleScene, standing_tool
 
-EVERY_PIXEL = ParticleFilterConfig(pixels_across=1_000)
+EVERY_PIXEL = ParticleFilterConfig(silhouette_pixels=1_000_000)
 
 
 @pytest.fixture(scope="module")
@@ -62,11 +62,33 @@ def test_truth_beats_what_lies_beside_it(scene) -> None:
 
 def test_fewer_pixels_give_about_the_same_weight(scene) -> None:
     T = centred(scene.truth, scene.model.centre)[None]
-    coarse = np.exp(likelihood_of(scene, ParticleFilterConfig(pixels_across=20))(T))
+    coarse = np.exp(likelihood_of(scene, ParticleFilterConfig(silhouette_pixels=200))(T))
     np.testing.assert_allclose(coarse, np.exp(likelihood_of(scene)(T)), atol=0.06)
 
 
-@pytest.mark.parametrize("place", [(0.0, 0.0, -1.0), (5.0, 0.0, 1.0)])
+@pytest.mark.parametrize("distance", [0.1, 0.3, 0.45, 0.8, 2.0])
+@pytest.mark.parametrize("pixels", [100, 600])
+def test_as_many_pixels_are_used_as_are_needed(scene, distance, pixels) -> None:
+    model = viewpoint_model(scene.model)
+    across, down = strides(model, CAMERA, distance, pixels)
+    silhouette = model.mean_area * CAMERA.fx * CAMERA.fy / max(distance, 0.15) ** 2
+    used = silhouette / (across * down)
+    assert across <= down
+    assert used < 2 * pixels
+    assert used >= pixels or (across, down) == (1, 1)
+
+
+def test_a_weight_does_not_depend_on_the_other_hypotheses(scene) -> None:
+    moved = [pose.perturbed(scene.truth, 0.03, 0.5, np.random.default_rng(k)) for k in range(20)]
+    poses = centred(np.stack(moved), scene.model.centre)
+    likelihood = likelihood_of(scene, ParticleFilterConfig())
+    together = likelihood(poses)
+    assert len(np.unique(together)) == len(together)
+    np.testing.assert_array_equal(likelihood(poses[::-1])[::-1], together)
+    np.testing.assert_array_equal([likelihood(T[None])[0] for T in poses], together)
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0, -1.0), (5.0, 0.0, 1.0), (0.0, -5.0, 1.0)])
 def test_hypothesis_out_of_sight_has_no_weight(scene, place) -> None:
     T = pose.exp([*place, 0.0, 0.0, 0.0])[None]
     assert likelihood_of(scene)(T)[0] == -np.inf

@@ -9,7 +9,7 @@ from registration_core import SnapConfig
 from registration_core.agreement import Prior, surface_of
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.proposals import propose
+from registration_core.proposals import around_start
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -31,7 +31,7 @@ def proposals():
         start = to_rows(truth)[0].copy()
         start[2, 3] -= toward
         prior = Prior(start, f4(0.02), f4(0.2))
-        return propose(prior, 1.0, surface_of(model), grid, config, np.random.default_rng(seed))
+        return around_start(prior, surface_of(model), grid, config, config.count, np.random.default_rng(seed))
 
     return draw, to_rows(truth)[0]
 

@@ -9,7 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from registration_core import Intrinsics, ObjectModel, pose
-from registration_core.rasterizer import render_depth
+from registration_core.rasterizer import draw_mesh, pixels_between, render_depth
 
 CAMERA = Intrinsics(320, 240, 300.0, 310.0, 155.2, 121.7)
 
@@ -90,3 +90,86 @@ def test_floor_under_the_camera_is_clipped_at_the_near_plane() -> None:
 def test_nothing_behind_the_camera_is_drawn() -> None:
     model = model_of(trimesh.creation.box((0.1, 0.1, 0.1)))
     assert not render_depth(model, CAMERA, pose.exp([0.0, 0.0, -0.5, 0.0, 0.0, 0.0])).any()
+
+
+def drawn(vertices: NDArray[np.float64], faces: NDArray[np.int32], both_sides: bool):
+    """Inverse depth, nearest face (H, W) and the part of the image that was drawn on."""
+    inverse_depth = np.zeros((CAMERA.height, CAMERA.width), np.float32)
+    nearest_face = np.full(inverse_depth.shape, -1, np.int32)
+    part = draw_mesh(
+        vertices, faces, CAMERA.fx, CAMERA.fy, CAMERA.cx, CAMERA.cy, inverse_depth, nearest_face, both_sides
+    )
+    return inverse_depth, nearest_face, part
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0, 0.5), (-0.26, 0.2, 0.5), (0.3, -0.2, 0.5), (2.0, 0.0, 0.5)])
+def test_everything_drawn_lies_in_the_part_that_is_told(centre: tuple[float, float, float]) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    inverse_depth, nearest_face, (top, bottom, left, right) = drawn(
+        np.asarray(ball.vertices) + centre, np.asarray(ball.faces, dtype=np.int32), True
+    )
+    rows, columns = np.nonzero(inverse_depth)
+    if centre[0] > 1.0:
+        assert len(rows) == 0
+        assert left >= right or top >= bottom
+        return
+    assert top <= rows.min() <= rows.max() < bottom
+    assert left <= columns.min() <= columns.max() < right
+    if centre == (0.0, 0.0, 0.5):  # not cut by the border
+        assert (bottom - top) * (right - left) == (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
+    np.testing.assert_array_equal(nearest_face >= 0, inverse_depth > 0)
+
+
+def test_front_sides_of_a_closed_mesh_show_all_of_it() -> None:
+    mesh = trimesh.creation.torus(major_radius=0.06, minor_radius=0.02)
+    vertices = pose.apply(pose.exp([0.05, -0.02, 0.4, 1.0, 0.4, -2.0]), np.asarray(mesh.vertices))
+    faces = np.asarray(mesh.faces, dtype=np.int32)
+    both, face_of_both, _ = drawn(vertices, faces, True)
+    front, face_of_front, _ = drawn(vertices, faces, False)
+    assert (both > 0).sum() > 1000
+    np.testing.assert_array_equal(front, both)
+    np.testing.assert_array_equal(face_of_front, face_of_both)
+    inside_out, _, _ = drawn(vertices, faces[:, ::-1].copy(), False)
+    assert (inside_out < both).sum() > 1000  # what is left is the far side
+
+
+@pytest.mark.parametrize(
+    "sides", [((1, 0), (0, 1)), ((5, 2), (-3, 4)), ((20, 8), (-12, 16)), ((0.3, 1), (-1, 0.3))]
+)
+def test_no_crack_opens_between_triangles(sides: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    # a grid of 8 x 8 parallelograms, with edges on the centres of pixels but for the rounding
+    basis, middle = np.array(sides), np.array([155.0, 122.0])
+    x, y = np.meshgrid(np.arange(-4, 5), np.arange(-4, 5))
+    pixels = np.stack([x, y], axis=-1).reshape(-1, 2) @ basis + middle
+    rays = (pixels - [CAMERA.cx, CAMERA.cy]) / [CAMERA.fx, CAMERA.fy]
+    corners = (np.arange(8)[:, None] * 9 + np.arange(8)).reshape(-1, 1)
+    faces = np.concatenate([corners + np.array([0, 1, 10]), corners + np.array([0, 10, 9])])
+    columns, rows = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
+    steps = (np.stack([columns, rows], axis=-1) - middle) @ np.linalg.inv(basis)
+    reach = np.abs(steps).max(axis=-1)
+    assert (reach < 4 - 1e-6).sum() > 40
+    for z in np.linspace(0.5, 1.5, 40):
+        vertices = np.column_stack([rays, np.ones(len(rays))]) * z
+        inverse_depth, _, _ = drawn(vertices, faces.astype(np.int32), True)
+        np.testing.assert_allclose(inverse_depth[reach < 4 - 1e-6], 1 / z, rtol=1e-6)
+        assert not inverse_depth[reach > 4 + 1e-6].any()
+
+
+def test_triangle_seen_edge_on_shows_nothing() -> None:
+    corners = np.array([[-0.1, 0.0, 0.5], [0.1, 0.0, 0.5], [0.3, 0.0, 1.0]])  # in a plane through the camera
+    inverse_depth, _, _ = drawn(corners, np.array([[0, 1, 2]], dtype=np.int32), True)
+    assert not inverse_depth.any()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [(1.2, 3.9, (2, 4)), (2.0, 3.0, (2, 4)), (-5.0, -1.0, (0, 0)), (-5.0, 99.0, (0, 10)), (2.1, 2.9, (3, 3))],
+)
+def test_pixels_between_two_places(low: float, high: float, expected: tuple[int, int]) -> None:
+    assert pixels_between(low, high, 10) == expected
+
+
+@pytest.mark.parametrize("low", [10.5, 1e12, np.inf])
+def test_no_pixel_lies_beyond_the_image(low: float) -> None:
+    first, end = pixels_between(low, low + 1.0, 10)
+    assert first >= end

@@ -5,9 +5,10 @@ import pytest
 
 from registration_core import SnapConfig, pose
 from registration_core.agreement import Prior
+from registration_core.evidence import evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import Residual, judge, residual_shares
+from registration_core.selection import is_settled, judge, match_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -27,20 +28,6 @@ def shifted(T, x=0.0, z=0.0):
     moved = T.copy()
     moved[[0, 2], 3] += [x, z]
     return moved
-
-
-def test_residuals_of_the_truth_and_of_shifted_poses(scene) -> None:
-    model, grid, truth = scene
-    poses = to_rows(np.stack([truth, *(shifted(truth, z=z) for z in (-0.1, 0.05, 0.008))]))
-    shares = residual_shares(poses, model, grid, truth[2, 3])
-    claimed = shares[:, : Residual.UNMEASURED + 1].sum(axis=1)
-    assert shares[0, [Residual.MATCH, Residual.PLANE_MATCH, Residual.TILTED]].sum() > 0.85 * claimed[0]
-    behind = shares[1, [Residual.SEEN_THROUGH, Residual.PLANE_SEEN_THROUGH]].sum()
-    assert behind > 0.8 * claimed[1]
-    hidden = shares[2, [Residual.HIDDEN, Residual.PLANE_HIDDEN]].sum()
-    assert hidden > 0.8 * claimed[2]
-    assert shares[3, Residual.NEAR_MISS] > 0.4 * claimed[3]
-    assert shares[1, Residual.UNEXPLAINED] + shares[2, Residual.UNEXPLAINED] > shares[0, Residual.UNEXPLAINED]
 
 
 def start_at(T):
@@ -67,3 +54,38 @@ def test_good_start_is_not_given_up_for_a_far_mode(scene) -> None:
     far = [pose.perturbed(truth, 0.06, 1.0, np.random.default_rng(k)) for k in range(20)]
     candidates = to_rows(np.stack([truth, truth, *far]))
     assert judge(candidates, 1, model, grid, start_at(truth), SnapConfig().selection).winner == 0
+
+
+def test_share_that_matches_falls_with_the_distance_from_the_truth(scene) -> None:
+    model, grid, truth = scene
+    poses = to_rows(np.stack([truth, shifted(truth, x=0.01), shifted(truth, x=0.04)]))
+    shares = match_shares(evidence(poses, model, grid, truth[2, 3]))
+    assert shares[0] > 0.8
+    assert shares[0] > shares[1] > shares[2]
+
+
+def test_what_is_hidden_does_not_count_against_the_share_that_matches(scene) -> None:
+    model, grid, truth = scene
+    hidden = grid.depth.copy()
+    column = int(grid.fx * truth[0, 3] / truth[2, 3] + grid.cx)
+    hidden[:, :column] = np.where(hidden[:, :column] > 0, 0.3, 0)
+    whole, half = (
+        match_shares(evidence(to_rows(truth), model, grid._replace(depth=depth), truth[2, 3]))[0]
+        for depth in (grid.depth, hidden)
+    )
+    assert half > 0.9 * whole
+
+
+def test_a_good_start_is_settled_and_a_bad_one_is_not(scene) -> None:
+    model, grid, truth = scene
+    config = SnapConfig().selection
+    for start, settled in ((shifted(truth, x=0.002), True), (shifted(truth, x=0.05), False)):
+        candidates = to_rows(np.stack([start, truth if settled else start]))
+        assert (
+            is_settled(judge(candidates, 1, model, grid, start_at(start), config), candidates, config)
+            is settled
+        )
+    far = to_rows(np.stack([shifted(truth, x=0.03), truth]))
+    judgement = judge(far, 1, model, grid, start_at(shifted(truth, x=0.03)), config)
+    assert judgement.winner == 1
+    assert not is_settled(judgement, far, config)

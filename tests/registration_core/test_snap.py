@@ -23,7 +23,7 @@ from registration_core import (
 )
 from registration_core.object_model import ContinuousSymmetry
 from registration_core.rasterizer import render_depth
-from registration_core.snap import seed_of
+from registration_core.seeding import seed_of
 from registration_core.snap_config import ParticleFilterConfig
 from tests.registration_core.simple_scene import CAMERA, SimpleScene, model_of, nearest, standing_tool
 

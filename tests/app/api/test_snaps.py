@@ -105,6 +105,40 @@ def test_the_same_seed_gives_the_same_result(script: httpx.Client, near: dict[st
     assert found[0]["confidence"] == found[1]["confidence"]
 
 
+def test_a_snap_searches_as_far_as_it_is_told_and_can_be_repeated(
+    script: httpx.Client, near: dict[str, Any]
+) -> None:
+    found = []
+    for spread in ([0.015, 0.2], [0.015, 0.2], [0.06, 1.0], None):
+        snap_id = request_snap(script, near, seed=11, start_spread=spread)
+        estimate = finished_snap(script, snap_id)["estimate"]
+        requested = next(event for event in log_of(script, near["id"]) if event["snap_id"] == snap_id)
+        assert estimate["start_spread"] == requested["detail"]["start_spread"] == spread
+        found.append((estimate["T_world_object"], estimate["confidence"]))
+        script.post(f"{url_of(near)}/undo")
+    assert found[0] == found[1]
+    assert len({confidence for _, confidence in found}) == 3
+
+
+def test_where_nothing_is_told_the_last_drags_tell(
+    live: LiveServer, script: httpx.Client, near: dict[str, Any]
+) -> None:
+    session = live.services.desk._seats[near["id"]].session
+    session.start_drag()
+    session.drag_to(NEAR @ pose.exp([0.02, 0, 0, 0, 0, 0]))
+    session.end_drag()
+    dragged = finished_snap(script, request_snap(script, near, seed=11))["estimate"]
+    assert dragged["start_spread"] == pytest.approx([0.02, SnapConfig().spread.rotation])
+    script.post(f"{url_of(near)}/undo")
+    told = request_snap(script, near, seed=11, start_spread=dragged["start_spread"])
+    again = finished_snap(script, told)["estimate"]
+    assert again["T_world_object"] == dragged["T_world_object"]
+    assert again["confidence"] == dragged["confidence"]
+    script.post(f"{url_of(near)}/undo")
+    unknown = finished_snap(script, request_snap(script, near, seed=11, start_spread=None))["estimate"]
+    assert unknown["start_spread"] is None and unknown["confidence"] != dragged["confidence"]
+
+
 def test_a_snap_needs_no_body(script: httpx.Client, near: dict[str, Any]) -> None:
     answer = script.post(f"{url_of(near)}/snaps")
     assert answer.status_code == 202
@@ -180,6 +214,16 @@ def test_a_snap_that_cannot_work_says_why(script: httpx.Client, near: dict[str, 
         ({"seed": 2**63}, "body.seed"),
         ({"seed": 1.5}, "body.seed"),
         ({"seed": "seven"}, "body.seed"),
+        ({"start_spread": 0.03}, "body.start_spread"),
+        ({"start_spread": []}, "body.start_spread"),
+        ({"start_spread": [0.03]}, "body.start_spread"),
+        ({"start_spread": [0.03, 0.3, 0.3]}, "body.start_spread"),
+        ({"start_spread": [-0.01, 0.3]}, "body.start_spread.0"),
+        ({"start_spread": [1.01, 0.3]}, "body.start_spread.0"),
+        ({"start_spread": ["far", 0.3]}, "body.start_spread.0"),
+        ({"start_spread": [0.03, -0.1]}, "body.start_spread.1"),
+        ({"start_spread": [0.03, 3.2]}, "body.start_spread.1"),
+        ({"start_spread": [0.03, None]}, "body.start_spread.1"),
     ],
 )
 def test_a_bad_wish_names_the_field(
@@ -189,6 +233,14 @@ def test_a_bad_wish_names_the_field(
     assert words in sentence(script.post(f"{url_of(near)}/snaps", json=body), 422)
     assert kinds(script, near["id"]) == before
     assert script.get(url_of(near)).json()["snap"] is None
+
+
+def test_a_spread_that_is_no_number_is_said(script: httpx.Client, near: dict[str, Any]) -> None:
+    for content in ('{"start_spread": [NaN, 0.1]}', '{"start_spread": [0.1, Infinity]}'):
+        answer = script.post(
+            f"{url_of(near)}/snaps", content=content, headers={"content-type": "application/json"}
+        )
+        assert "body.start_spread." in sentence(answer, 422)
 
 
 def test_a_submitted_registration_is_not_snapped(script: httpx.Client, near: dict[str, Any]) -> None:

@@ -59,6 +59,7 @@ def fill(site: Site) -> int:
                     converged=True,
                     seed=2**40,
                     config={"particles": 625, "nested": {"a": 1}},
+                    start_spread=[0.03, 0.35],
                     version="0.1.0",
                     hardware="a machine",
                     seconds=0.02,
@@ -118,6 +119,7 @@ def test_an_estimate_has_what_repeats_it(site: Site, tmp_path: Path) -> None:
     _, (estimate,) = written(site, tmp_path / "log")
     assert (estimate["image_id"], estimate["seed"], estimate["version"]) == (5, 2**40, "0.1.0")
     assert estimate["config"] == {"particles": 625, "nested": {"a": 1}}
+    assert estimate["start_spread"] == [0.03, 0.35]
     assert estimate["T_world_object_start"] == BEFORE
     assert estimate["hypotheses"] == [{"T_camera_object": AFTER, "weight": 1.0}]
 

@@ -129,6 +129,13 @@ def test_confidence_stays_with_its_pose():
     assert history.redone().current.confidence is None
 
 
+def test_what_was_dragged_is_known_as_such():
+    log = [Logged(kind, pose_at(1.0).tolist()) for kind in sorted(NEW_POSE_KINDS)]
+    (start, *steps) = replay(START, log).steps
+    assert not start.dragged
+    assert [step.dragged for step in steps] == [event.kind == "drag" for event in log]
+
+
 def test_a_step_past_either_end_is_a_programming_error():
     with pytest.raises(AssertionError):
         History((Step(START),)).undone()

@@ -13,9 +13,11 @@ from app.labeling.session import ActionError, LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.tables import EstimateRow
 from registration_core import Estimate, Hypothesis, SnapConfig, pose
+from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
 FRAMES = (11, 12)
+PIVOT = np.array([0.02, -0.01, 0.03])
 
 
 def shifted(amount: float, axis: int = 0) -> np.ndarray:
@@ -101,7 +103,7 @@ class Bench:
             state=state,
             frame_id=FRAMES[0],
             frame_ids=FRAMES,
-            pivot=np.array([0.02, -0.01, 0.03]),
+            pivot=PIVOT,
             record_event=self.log,
             request_snap=self.workers,
         )
@@ -318,15 +320,58 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     assert bench.state.confidence == 0.8 and bench.state.offer is None
     requested, applied = bench.log.events
     assert (requested.kind, requested.actor, requested.snap_id) == ("snap_requested", Actor.HUMAN, snap_id)
-    assert requested.detail == {"seed": 42, "config": SnapConfig.paper().to_dict(), "frame_id": FRAMES[0]}
+    assert requested.detail == {
+        "seed": 42,
+        "config": SnapConfig.paper().to_dict(),
+        "start_spread": None,
+        "frame_id": FRAMES[0],
+    }
     assert (applied.kind, applied.actor, applied.snap_id) == ("snap_applied", Actor.MACHINE, snap_id)
     assert np.array_equal(applied.T_before, START) and np.array_equal(applied.T_after, shifted(0.05))
     assert applied.detail == {"confidence": 0.8}
     (row,) = bench.log.estimates
     assert (row.snap_id, row.registration_id, row.frame_id, row.seed) == (snap_id, 7, FRAMES[0], 42)
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
-    assert row.config == SnapConfig.paper().to_dict()
+    assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
+
+
+def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
+    bench.drag(shifted(0.03))
+    bench.drag(shifted(0.03) @ about(PIVOT, turn(1, 0.3)))
+    bench.session.snap(Actor.HUMAN)
+    (snap,) = bench.workers.snaps
+    assert snap.order.start_spread == pytest.approx((0.03, 0.3))
+    assert bench.log.events[-1].detail["start_spread"] == list(snap.order.start_spread)
+    snap.end(result(shifted(0.05)))
+    (row,) = bench.log.estimates
+    assert row.start_spread == list(snap.order.start_spread)
+    bench.session.snap(Actor.HUMAN)
+    assert bench.workers.snaps[-1].order.start_spread is None
+
+
+def test_a_drag_under_way_is_told_as_if_it_ended(bench):
+    bench.drag(shifted(0.05))
+    bench.session.start_drag()
+    bench.session.snap(Actor.HUMAN)
+    bench.session.drag_to(shifted(0.07))
+    bench.session.snap(Actor.HUMAN)
+    held, moved = (snap.order.start_spread for snap in bench.workers.snaps)
+    assert held == pytest.approx((0.05, SnapConfig().spread.rotation))
+    assert moved == pytest.approx((0.02, SnapConfig().spread.rotation))
+
+
+def test_the_part_that_no_drag_tells_is_the_configurations(bench):
+    bench.drag(shifted(0.03))
+    bench.session.snap(Actor.SCRIPT, SnapConfig.from_dict({"spread": {"rotation": 0.25}}))
+    assert bench.workers.snaps[0].order.start_spread == pytest.approx((0.03, 0.25))
+
+
+@pytest.mark.parametrize("given", [None, (0.002, 0.01)])
+def test_a_spread_that_is_given_goes_over_the_drags(bench, given):
+    bench.drag(shifted(0.03))
+    bench.session.snap(Actor.SCRIPT, start_spread=given)
+    assert bench.workers.snaps[0].order.start_spread == given
 
 
 def test_seeds_differ_where_none_is_given(bench):

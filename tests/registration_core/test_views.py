@@ -1,0 +1,95 @@
+"""One pose against several views: exact where they agree, and better than the worst of them."""
+
+import numpy as np
+import pytest
+
+from registration_core import SnapConfig, pose, snap_views
+from registration_core.estimate import WorldEstimate
+from registration_core.rasterizer import render_depth
+from tests.registration_core.simple_scene import CAMERA, block, model_of, nearest, noisy, tool
+
+T_WORLD_OBJECT = pose.exp([0.02, 0.0, 0.035, 0.0, 0.0, 0.6])
+
+
+def around(angle: float):
+    """`T_world_camera` of a camera 0.8 m off that looks down on the table from a side."""
+    T_camera_table = pose.exp([0.0, 0.12, 0.85, np.radians(-125.0), 0.0, 0.0])
+    return pose.inverse(T_camera_table @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, angle]))
+
+
+def view(angle: float):
+    """What that camera sees of the tool on the table."""
+    T_camera_world = pose.inverse(around(angle))
+    table = model_of(block((1.2, 1.2, 0.02), (0.0, 0.0, -0.01)))
+    depths = (
+        render_depth(table, CAMERA, T_camera_world),
+        render_depth(tool(), CAMERA, T_camera_world @ T_WORLD_OBJECT),
+    )
+    return noisy(nearest(*depths)), CAMERA, around(angle)
+
+
+@pytest.fixture(scope="module")
+def views():
+    return [view(angle) for angle in (0.0, 2.0, 4.0)]
+
+
+def run(views, start, **options) -> WorldEstimate:
+    return snap_views(tool(), views, start, rng=np.random.default_rng(0), **options)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_recovers_the_pose_from_far_off(views, seed) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.06, np.radians(40), np.random.default_rng(seed))
+    estimate = run(views, start)
+    apart = pose.distance(estimate.T_world_object, T_WORLD_OBJECT)
+    assert apart.translation < 0.003
+    assert apart.rotation < np.radians(1.5)
+    assert estimate.confidence > 0.9
+    assert estimate.converged
+    np.testing.assert_array_equal(estimate.T_camera_object, estimate.T_world_object)
+    np.testing.assert_array_equal(estimate.hypotheses[0].T_camera_object, estimate.T_world_object)
+
+
+def test_more_views_leave_less_doubt(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.01, 0.1, np.random.default_rng(0))
+    one, three = run(views[:1], start), run(views, start)
+    assert np.trace(three.covariance) < 0.7 * np.trace(one.covariance)
+    np.testing.assert_allclose(three.covariance, three.covariance.T)
+
+
+def test_same_seed_same_estimate(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.03, 0.3, np.random.default_rng(1))
+    first, again = run(views[:2], start), run(views[:2], start)
+    np.testing.assert_array_equal(first.T_world_object, again.T_world_object)
+    assert first.seed == again.seed == 0
+
+
+def test_views_that_do_not_show_the_object_are_left_out(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.02, 0.2, np.random.default_rng(2))
+    depth, camera, T_world_camera = views[1]
+    away = T_world_camera @ pose.exp([0.0, 0.0, 0.0, 0.0, np.pi, 0.0])
+    with_it, without = run([views[0], (depth, camera, away)], start), run(views[:1], start)
+    np.testing.assert_array_equal(with_it.T_world_object, without.T_world_object)
+
+
+def test_hidden_object_keeps_the_operators_pose(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.01, 0.1, np.random.default_rng(0))
+    walls = [(np.full_like(depth, 0.3), camera, T) for depth, camera, T in views]
+    estimate = run(walls, start)
+    np.testing.assert_allclose(estimate.T_world_object, start, atol=1e-6)
+    assert estimate.confidence < 0.1
+    assert not estimate.converged
+
+
+def test_bad_input_is_named(views) -> None:
+    depth, camera, T = views[0]
+    outside = pose.exp([0.0, 0.0, -5.0, 0.0, 0.0, 0.0])
+    for start, given, options, message in (
+        (T_WORLD_OBJECT, [], {}, "views must"),
+        (T_WORLD_OBJECT, [(depth[:5], camera, T)], {}, r"views\[0\]: depth must have the shape"),
+        (T_WORLD_OBJECT, [(depth, camera, 2.0 * T)], {}, r"views\[0\]: T_world_camera must"),
+        (outside, [(depth, camera, T)], {}, "T_world_object puts the object wholly outside"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"config": SnapConfig.paper()}, "config.method must"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            run(given, start, **options)
