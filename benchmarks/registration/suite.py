@@ -7,10 +7,12 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.figures import Figure
+from benchmarks.registration.anywhere import proposal_figures
 from benchmarks.registration.instances import (
     HALF,
     REAL,
     SYNTHETIC,
+    YCB,
     Instance,
     real_instances,
     synthetic_instances,
@@ -18,6 +20,7 @@ from benchmarks.registration.instances import (
 from benchmarks.registration.methods import BEST_OF, DEFAULT, GICP, ICP, NOTHING, PAPER, TOLD
 from benchmarks.registration.objects import DATA
 from benchmarks.registration.overlays import write_overlays
+from benchmarks.registration.several_views import view_figures
 from benchmarks.registration.starts import GOOD, SHELLS, Shell
 from benchmarks.registration.tables import print_reliability, print_tables
 from benchmarks.registration.targets import figures
@@ -32,6 +35,8 @@ AN_OBJECT = 8
 """Synthetic instances of each object in each set."""
 STARTS, REAL_STARTS = 5, 20
 """From each shell about each instance."""
+SEEDS = 10
+"""Of proposals for each instance."""
 STARTS_A_SLOW_ONE = 5
 """The best of 32 has this many times fewer starts, ..."""
 INSTANCES_A_PAPER = 12
@@ -61,7 +66,8 @@ def measure(quick: bool) -> list[Figure]:
             print_reliability(console, own, title)
     if folder := os.environ.get(OVERLAYS_VARIABLE):
         write_overlays(Path(folder), instances, trials)
-    return [*figures(results), *timed]
+    proposed = proposal_figures([one for one in instances if one.set_name == YCB], 1 if quick else SEEDS)
+    return [*figures(results), *view_figures(1 if quick else REAL_STARTS), *proposed, *timed]
 
 
 def _sets(instances: list[Instance]) -> list[str]:
