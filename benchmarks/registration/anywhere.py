@@ -21,7 +21,7 @@ MARGIN = 40
 
 
 def proposal_figures(instances: Sequence[Instance], seeds: int) -> list[Figure]:
-    """Shares found and seconds, in whole images and in regions as a person draws them; none of no instance."""
+    """Shares found and seconds, in whole images and in regions as a person draws them."""
     if not instances:
         return []
     with single_threaded_pool(1) as pool:

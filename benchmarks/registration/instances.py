@@ -66,6 +66,7 @@ class Instance:
     """The same without a sensor's errors, where it is known."""
     color_path: Path | None = None
     T_world_camera: Array | None = None
+    """(4, 4), where it is known."""
 
 
 def synthetic_instances(set_name: str, an_object: int) -> list[Instance]:
@@ -133,5 +134,6 @@ def _bunny() -> Iterator[Instance]:
         (truth,) = image.ground_truth or ()
         yield Instance(
             BUNNY, f"{BUNNY} {image.image_id}", BUNNY, model, read_depth(image.depth_path, image.depth_scale),
-            image.camera, truth.T_camera_object, image.image_id, color_path=image.color_path, T_world_camera=image.T_world_camera,
+            image.camera, truth.T_camera_object, image.image_id, color_path=image.color_path,
+            T_world_camera=image.T_world_camera,
         )  # fmt: skip
