@@ -1,1 +1,1 @@
-"""How fast, how big and how reliable the running application is: `python -m benchmarks`."""
+"""How fast, big and reliable the running application is, and how well snaps register: `python -m benchmarks`."""

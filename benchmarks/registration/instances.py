@@ -69,12 +69,12 @@ class Instance:
     """(4, 4), where it is known."""
 
 
-def synthetic_instances(set_name: str, an_object: int) -> list[Instance]:
+def synthetic_instances(set_name: str, an_object: int, most_scenes: int = MOST_SCENES) -> list[Instance]:
     """So many instances of each known object among others and unknown things; always the same ones."""
     recipe, objects = RECIPES[set_name], known_objects()
     found: Counter[str] = Counter()
     instances: list[Instance] = []
-    for scene_id in range(MOST_SCENES):
+    for scene_id in range(most_scenes):
         if all(found[name] == an_object for name in objects):
             break
         rng = np.random.default_rng([recipe.seed, scene_id])

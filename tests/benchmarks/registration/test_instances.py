@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.registration import instances
 from benchmarks.registration.instances import BUNNY, HALF, YCB, Instance, real_instances, synthetic_instances
 from registration_core.rasterizer import render_depth
 
@@ -20,15 +19,8 @@ def shares(instance: Instance) -> tuple[float, float]:
 
 
 @pytest.fixture(scope="module")
-def few(module_patch: pytest.MonkeyPatch) -> list[Instance]:
-    module_patch.setattr(instances, "MOST_SCENES", 1)
-    return synthetic_instances(HALF, 1)
-
-
-@pytest.fixture(scope="module")
-def module_patch():
-    with pytest.MonkeyPatch.context() as patch:
-        yield patch
+def few() -> list[Instance]:
+    return synthetic_instances(HALF, 1, most_scenes=1)
 
 
 def test_synthetic_objects_are_where_they_are_said_to_be(few: list[Instance]) -> None:
@@ -40,7 +32,7 @@ def test_synthetic_objects_are_where_they_are_said_to_be(few: list[Instance]) ->
 
 
 def test_synthetic_instances_are_always_the_same(few: list[Instance]) -> None:
-    again = synthetic_instances(HALF, 1)
+    again = synthetic_instances(HALF, 1, most_scenes=1)
     assert [one.object_name for one in again] == [one.object_name for one in few]
     assert all(np.array_equal(a.depth, b.depth) for a, b in zip(again, few, strict=True))
 
