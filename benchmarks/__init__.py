@@ -1,1 +1,1 @@
-"""How fast, big and reliable the running application is, and how well snaps register: `python -m benchmarks`."""
+"""How fast and reliable the application is, and how well its snaps register: `python -m benchmarks`."""

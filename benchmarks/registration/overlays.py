@@ -46,7 +46,7 @@ def overlay(instance: Instance, trial: Trial) -> Image.Image:
     silhouettes = [render_depth(instance.model, instance.camera, T) > 0 for T, _ in poses]
     pictures = [shaded(instance.depth)]
     if instance.color_path is not None:
-        pictures.append(read_color(instance.color_path))
+        pictures.append(read_color(instance.color_path).copy())
     for picture in pictures:
         for silhouette, (_, color) in zip(silhouettes, poses, strict=True):
             picture[outline(silhouette)] = color

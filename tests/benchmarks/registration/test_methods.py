@@ -1,13 +1,17 @@
 """Every method registers an object from nearby, and fits in one signature."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
+from PIL import Image
 
 from benchmarks.registration.ambiguity import fits_as_well
 from benchmarks.registration.instances import HALF, Instance
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.methods import METHODS, NOTHING, PAPER, polished_truth, register
-from benchmarks.registration.overlays import overlay
+from benchmarks.registration.overlays import MAGENTA, YELLOW, write_overlays
 from benchmarks.registration.starts import SHELLS, starts
 from benchmarks.registration.trials import Trial, try_instance
 from registration_core import pose
@@ -70,11 +74,18 @@ def test_a_mug_with_its_handle_behind_fits_in_other_ways() -> None:
     assert not fits_as_well(alone(handle_in_view), T_camera_table @ turned_mug(60.0))
 
 
-def test_an_overlay_shows_both_outlines(drill: Instance, trials: list[Trial]) -> None:
-    trial = next(trial for trial in trials if trial.method == "default")
-    picture = np.asarray(overlay(drill, trial))
-    colors = {tuple(color) for color in picture.reshape(-1, 3).tolist()}
-    assert (255, 210, 0) in colors and (255, 0, 255) in colors
+def test_overlays_show_outlines_on_depth_and_on_colour(
+    drill: Instance, trials: list[Trial], tmp_path: Path
+) -> None:
+    color_path = tmp_path / "color.png"
+    Image.new("RGB", (drill.camera.width, drill.camera.height), (1, 2, 3)).save(color_path)
+    write_overlays(tmp_path / "out", [replace(drill, color_path=color_path)], trials)
+    (written,) = (tmp_path / "out").iterdir()
+    picture = np.asarray(Image.open(written).convert("RGB"))
+    assert written.name.startswith("right_one_drill_20mm")
+    for half in np.array_split(picture, 2, axis=1):
+        colors = {tuple(color) for color in half.reshape(-1, 3).tolist()}
+        assert {YELLOW, MAGENTA} <= colors
 
 
 def turned_mug(degrees: float) -> np.ndarray:
