@@ -1,1 +1,1 @@
-"""How fast, how big and how reliable the running application is: `python -m benchmarks`."""
+"""How fast and reliable the application is, and how well its snaps register: `python -m benchmarks`."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.console import Console
 
 from app.config import PROJECT
-from benchmarks import commits, load, memory, open_task, snap, startup
+from benchmarks import commits, load, memory, open_task, registration, snap, startup
 from benchmarks.figures import Figure, table
 
 BENCHMARKS = {
@@ -22,6 +22,7 @@ BENCHMARKS = {
     "commits": commits,
     "memory": memory,
     "load": load,
+    "registration": registration,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""
@@ -31,7 +32,7 @@ IDLE_LOAD = 0.3
 
 def main() -> int:
     """Returns 1 where a target was missed."""
-    parser = argparse.ArgumentParser(prog="benchmarks", description="Measure the running application.")
+    parser = argparse.ArgumentParser(prog="benchmarks", description="Measure snaps and the application.")
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)}; default: all")
     parser.add_argument("--quick", action="store_true", help="tiny counts: only whether everything works")
     arguments = parser.parse_args()

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
+DIGITS = {"s": 3, "ms": 1, "%": 1}
+"""Decimals shown by unit; of others none."""
+
 
 @dataclass(frozen=True)
 class Target:
@@ -69,5 +72,5 @@ def _judged(figure: Figure) -> tuple[str, str]:
 
 
 def _amount(value: float, unit: str) -> str:
-    digits = f"{value:.3f}" if unit == "s" else f"{value:,.0f}"
+    digits = f"{value:,.{DIGITS.get(unit, 0)}f}"
     return f"{digits} {unit}".strip()

@@ -1,0 +1,89 @@
+"""Everything that is measured side by side, under one signature."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.registration import peers
+from benchmarks.registration.instances import Instance
+from benchmarks.registration.starts import Shell
+from registration_core import SnapConfig, snap, warm_up
+from registration_core.agreement import surface_of
+from registration_core.kernels import from_rows
+from registration_core.observation import observe
+from registration_core.problem import checked_problem
+from registration_core.search import Search
+from registration_core.snap_config import ParticleFilterConfig
+
+Array = NDArray[np.float64]
+
+NOTHING, ICP, BEST_OF, GICP = "no-op", "Open3D ICP", "Open3D ICP, best of 32", "small_gicp GICP"
+PAPER, DEFAULT, TOLD = "paper()", "default", "default, spread told"
+METHODS = (NOTHING, ICP, BEST_OF, GICP, PAPER, DEFAULT, TOLD)
+PEERS = (GICP, BEST_OF)
+"""Whose success and time the default has to beat."""
+
+STARTS_OF_BEST = 32
+SHORT_PAPER = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(50, 5))
+"""The same code as `SnapConfig.paper()`, for a quick run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a method made of a start."""
+
+    T_camera_object: Array
+    seconds: float
+    confidence: float | None = None
+
+
+def register(
+    method: str, instance: Instance, T_start: Array, shell: Shell, seed: int, quick: bool = False
+) -> Outcome:
+    """Run one of METHODS from one start (4, 4); only `TOLD` and `BEST_OF` learn the shell's size."""
+    if method in (PAPER, DEFAULT, TOLD):
+        config = SnapConfig() if method != PAPER else SHORT_PAPER if quick else SnapConfig.paper()
+        spread = (shell.translation, shell.rotation) if method == TOLD else None
+        return _snapped(instance, T_start, config, spread, seed)
+    align: Callable[[], Array] = {
+        NOTHING: lambda: T_start,
+        ICP: lambda: peers.open3d_icp(instance, T_start),
+        BEST_OF: lambda: peers.open3d_best_of(instance, T_start, shell, STARTS_OF_BEST, seed),
+        GICP: lambda: peers.gicp(instance, T_start),
+    }[method]
+    began = time.perf_counter()
+    T = align()
+    return Outcome(T, time.perf_counter() - began)
+
+
+def _snapped(
+    instance: Instance, T_start: Array, config: SnapConfig, spread: tuple[float, float] | None, seed: int
+) -> Outcome:
+    began = time.perf_counter()
+    estimate = snap(
+        instance.model, instance.depth, instance.camera, T_start, config, np.random.default_rng(seed), spread
+    )
+    return Outcome(estimate.T_camera_object, time.perf_counter() - began, estimate.confidence)
+
+
+def polished_truth(instance: Instance) -> Array:
+    """Where the finest polish of a snap ends when it starts at the truth: what the noise allows."""
+    problem = checked_problem(
+        instance.model, instance.depth, instance.camera, instance.truth, SnapConfig(), None
+    )
+    rng = np.random.default_rng(0)
+    observation = observe(
+        problem.depth, problem.camera, problem.start[:3, 3], problem.model, problem.config.observation, rng
+    )
+    search = Search(problem, observation, surface_of(problem.model), rng, 0, 0.0)
+    return problem.uncentred(from_rows(search.polished_start()[-1:])[0])
+
+
+@cache
+def warmed_up() -> None:
+    """Load all kernels, once a process."""
+    warm_up()

@@ -1,0 +1,115 @@
+"""The same starts for every method, spread over the processors, one thread each."""
+
+import multiprocessing
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from benchmarks.registration.ambiguity import fits_as_well
+from benchmarks.registration.instances import Instance
+from benchmarks.registration.judging import Error, Judge
+from benchmarks.registration.methods import polished_truth, register, warmed_up
+from benchmarks.registration.starts import Shell, starts
+
+Array = NDArray[np.float64]
+
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+Plan = Mapping[Shell, Mapping[str, int]]
+"""For each shell and method, from how many starts about an instance: always the first ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What one method made of one start."""
+
+    set_name: str
+    scene: str
+    instance: int
+    """Index among all instances."""
+    shell: Shell
+    start: int
+    method: str
+    start_error: Error
+    error: Error
+    T_start: Array
+    T_result: Array
+    fits_elsewhere: bool
+    """Wrong by ADD(-S), though perfect depth would show it no worse than the truth: nothing could tell."""
+    seconds: float
+    confidence: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class InstanceTrials:
+    """All trials of one instance."""
+
+    trials: list[Trial]
+    polish_error: Error
+    """Where the polish ends that starts at the truth."""
+
+
+def run_trials(
+    instances: Sequence[Instance], plans: Sequence[Plan], quick: bool, console: Console
+) -> list[InstanceTrials]:
+    """Every instance by its plan, in the order of the instances."""
+    results: dict[int, InstanceTrials] = {}
+    with single_threaded_pool(len(os.sched_getaffinity(0))) as pool:
+        futures = {
+            pool.submit(try_instance, instance, n, plan, quick): n
+            for n, (instance, plan) in enumerate(zip(instances, plans, strict=True))
+        }
+        for future in as_completed(futures):
+            results[futures[future]] = future.result()
+            if len(results) % 10 == 0 or len(results) == len(instances):
+                console.print(f"{len(results)} of {len(instances)} instances", style="dim")
+    return [results[n] for n in sorted(results)]
+
+
+@contextmanager
+def single_threaded_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes that start anew with one thread each: libraries read their number of threads only once."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    context = multiprocessing.get_context("spawn")
+    try:
+        with ProcessPoolExecutor(processes, context) as pool:
+            yield pool
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def try_instance(instance: Instance, number: int, plan: Plan, quick: bool) -> InstanceTrials:
+    """Every method from the starts of one instance."""
+    warmed_up()
+    judge = Judge(instance.model)
+    polish_error = judge.error(polished_truth(instance), instance.truth)  # builds the viewpoint model, too
+    trials = []
+    for shell, counts in plan.items():
+        most = max(counts.values())
+        poses = starts(instance.truth, instance.model, instance.camera, shell, most, instance.seed)
+        errors = [judge.error(T_start, instance.truth) for T_start in poses]
+        for method, count in counts.items():
+            for n, T_start in enumerate(poses[:count]):
+                outcome = register(method, instance, T_start, shell, n, quick)
+                error = judge.error(outcome.T_camera_object, instance.truth)
+                trials.append(
+                    Trial(
+                        instance.set_name, instance.scene, number, shell, n, method, errors[n],
+                        error, T_start, outcome.T_camera_object,
+                        not error.is_right and fits_as_well(instance, outcome.T_camera_object),
+                        outcome.seconds, outcome.confidence,
+                    )
+                )  # fmt: skip
+    return InstanceTrials(trials, polish_error)
