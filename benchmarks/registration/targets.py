@@ -56,10 +56,10 @@ def _successes(
 
 
 def _ambiguities(trials: Sequence[Trial]) -> Iterable[Figure]:
-    for set_name in SYNTHETIC:
+    for set_name in SETS:
         elsewhere = [t.fits_elsewhere for t in trials if t.set_name == set_name and t.shell != GOOD]
         if elsewhere:
-            name = f"{set_name}, wrong though perfect depth would fit as well, of all"
+            name = f"{set_name}, wrong though depth fits as well as at the truth, of all"
             yield Figure(name, _percent(elsewhere), "%")
 
 

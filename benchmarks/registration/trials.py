@@ -42,7 +42,7 @@ class Trial:
     T_start: Array
     T_result: Array
     fits_elsewhere: bool
-    """Wrong by ADD(-S), though perfect depth would show it no worse than the truth: nothing could tell."""
+    """Wrong by ADD(-S), though depth fits there as well as at the truth: depth alone could not tell."""
     seconds: float
     confidence: float | None
 
