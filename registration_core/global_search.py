@@ -10,7 +10,6 @@ from registration_core.agreement import Prior, surface_of
 from registration_core.camera import Intrinsics
 from registration_core.confidence import grouped
 from registration_core.estimate import Hypothesis
-from registration_core.evidence import evidence
 from registration_core.kernels import from_rows, to_rows
 from registration_core.object_model import ObjectModel
 from registration_core.observation import observe_region
@@ -76,7 +75,7 @@ def propose(
     found, agreement = ranked(poses, search.weighed(poses), config.anywhere.kept)
     for stage in config.anywhere.stages:
         found, agreement = search.refined(found, agreement, stage)
-    counts = evidence(found, known, observation.grid, distance)
+    counts = search.evidence(found)
     seen = match_shares(counts) >= config.selection.min_match
     if not seen.any():
         return ()

@@ -51,6 +51,12 @@ class Problem:
     """The same, as wide as proposals are drawn."""
     config: SnapConfig
 
+    @property
+    def spread(self) -> tuple[float, float]:
+        """How far off the start may be, metres and radians: what the caller said, or the default."""
+        factor = self.config.spread.search
+        return float(self.search.translation) / factor, float(self.search.rotation) / factor
+
     def uncentred(self, T_camera_centre: Array) -> Array:
         """`T_camera_object` of a pose (4, 4), exactly rigid."""
         return uncentred(pose.orthonormalised(T_camera_centre), self.model.centre)

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
-from registration_core.evidence import evidence
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct
 from registration_core.polish import covariance, eased
@@ -27,7 +26,7 @@ def progress(search: Search, iteration: int, iterations: int, poses: Array32) ->
     """A step with the hypotheses alive, (N, 3, 4), best first; its confidence takes the best one's mode for
     the only.
     """
-    counts = _evidence_of_best(search, poses)
+    counts = search.evidence(poses[:1])[0]
     return SnapStep(
         iteration,
         iterations,
@@ -50,11 +49,19 @@ def verdict(search: Search, iteration: int, candidates: Array32, judgement: Judg
     return _conclusion(search, iteration, candidates, winner, judgement.scores / temperature, counts)
 
 
+def certainty(search: Search, candidates: Array32, judgement: Judgement) -> float:
+    """The confidence that a `verdict` on these candidates (N, 3, 4) would have."""
+    config = search.problem.config.confidence
+    scores = judgement.scores / config.temperature
+    _, masses = grouped(candidates, judgement.winner, scores, search.problem.model, config)
+    return confidence(float(masses[0]), judgement.counts[judgement.winner], config)
+
+
 def outcome(search: Search, iteration: int, particles: Array32, log_weights: Array) -> SnapStep:
     """The last step of the particle filter: Eq. 2 over its particles (N, 3, 4), best first."""
     kept = distinct(particles, -np.arange(len(particles), dtype=np.float32), 24, 0.003, 0.05)
     scores = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
-    return _conclusion(search, iteration, particles[kept], 0, scores, _evidence_of_best(search, particles))
+    return _conclusion(search, iteration, particles[kept], 0, scores, search.evidence(particles[:1])[0])
 
 
 def nothing_seen(search: Search, iteration: int) -> SnapStep:
@@ -98,9 +105,3 @@ def _final(
         seed=search.seed,
     )
     return SnapStep(iteration, iteration, poses[0], belief, np.stack(poses), estimate)
-
-
-def _evidence_of_best(search: Search, poses: Array32) -> Array:
-    problem = search.problem
-    distance = float(problem.start[2, 3])
-    return evidence(poses[:1], problem.model, search.observation.grid, distance)[0]

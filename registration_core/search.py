@@ -1,24 +1,28 @@
 """One snap under way: what it works on, and the moves of the fast method."""
 
+import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.agreement import Surface, agreement_weights, sparse_agreement
+from registration_core.evidence import evidence
 from registration_core.kernels import Array32, f4
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.observation import Observation
 from registration_core.polish import FINAL_TUKEY, polish, systems
 from registration_core.problem import Problem
 from registration_core.proposals import around_start
-from registration_core.selection import Judgement, judge
 from registration_core.snap_config import StageConfig
 
 Array = NDArray[np.float64]
 
 NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
 """Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
+SHOWN = 625
+"""Proposals that are shown as progress, at most."""
 NEAR_ITERATIONS = 14
 """Steps of each of them."""
 
@@ -37,15 +41,30 @@ class Search:
     evaluations: int = 0
     """Hypotheses compared with the image so far."""
 
-    def proposals(self) -> tuple[Array32, Array32]:
-        """The best proposals (N, 3, 4), best first, and their agreement (N,)."""
+    def round(self, share: float) -> Iterator[Array32]:
+        """Proposals, and then the modes (N, 3, 4) that every stage leaves, best first.
+
+        Args:
+            share: of all proposals that are drawn, and of all modes that are kept.
+        """
         config = self.problem.config
-        search, spread = self.problem.search, config.spread
-        widest = spread.search**2 * spread.translation * spread.rotation
-        share = float(search.translation * search.rotation) / widest
-        count = int(min(1.0, max(config.proposals.least_share, share)) * config.proposals.count)
-        poses = around_start(search, self.surface, self.observation.grid, config.proposals, count, self.rng)
-        return ranked(poses, self.weighed(poses), config.wide_kept)
+        poses = around_start(
+            self.problem.search, self.surface, self.observation.grid, config.proposals,
+            int(share * self._most_proposals()), self.rng,
+        )  # fmt: skip
+        kept = int(share * config.wide_kept)
+        poses, agreement = ranked(poses, self.weighed(poses), kept)
+        yield poses[:SHOWN]
+        for stage in config.stages:
+            fewer = dataclasses.replace(stage, modes=max(1, int(share * stage.modes)))
+            poses, agreement = self.refined(poses, agreement, fewer)
+            yield poses
+
+    def _most_proposals(self) -> int:
+        """Fewer where the caller says that the start is close."""
+        config, (translation, rotation) = self.problem.config, self.problem.spread
+        share = translation * rotation / (config.spread.translation * config.spread.rotation)
+        return int(min(1.0, max(config.proposals.least_share, share)) * config.proposals.count)
 
     def weighed(self, poses: Array32) -> Array32:
         """Agreement (N,) of proposals (N, 3, 4), of which none is exact yet."""
@@ -85,13 +104,11 @@ class Search:
             ]
         )  # fmt: skip
 
-    def judged(self, candidates: Array32, near: int) -> Judgement:
-        """The winner among candidates (N, 3, 4): the start, `near` polishes of it, and other modes."""
-        problem = self.problem
-        self.evaluations += len(candidates)
-        return judge(
-            candidates, near, problem.model, self.observation.grid, problem.prior, problem.config.selection
-        )
+    def evidence(self, poses: Array32) -> Array:
+        """What the pixels say of poses (N, 3, 4): (N, COUNT)."""
+        self.evaluations += len(poses)
+        distance = float(self.problem.start[2, 3])
+        return evidence(poses, self.problem.model, self.observation.grid, distance)
 
     def hessian(self, T: Array32) -> Array:
         """How firmly the depth holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 from registration_core import evidence
 from registration_core.agreement import Prior, heavy_tails
 from registration_core.kernels import Array32, squared_angle
-from registration_core.observation import Grid
 from registration_core.snap_config import SelectionConfig
-from registration_core.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]
 
@@ -31,18 +29,13 @@ class Judgement:
     """(N, evidence.COUNT), pixels of each class over the mean silhouette area at the start's depth."""
 
 
-def judge(
-    candidates: Array32,
-    near: int,
-    model: ViewpointModel,
-    grid: Grid,
-    prior: Prior,
-    config: SelectionConfig,
-) -> Judgement:
+def judge(candidates: Array32, counts: Array, near: int, prior: Prior, config: SelectionConfig) -> Judgement:
     """Choose among poses (N, 3, 4): the start first, then `near` polishes of it, then the modes found
     elsewhere.
+
+    Args:
+        counts: (N, evidence.COUNT), their evidence.
     """
-    counts = evidence.evidence(candidates, model, grid, float(prior.start[2, 3]))
     values = scores(counts, heavy_tails(candidates, prior), config)
     return Judgement(chosen(values, near, config), values, counts)
 

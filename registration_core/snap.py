@@ -21,10 +21,10 @@ from registration_core.object_model import ObjectModel
 from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
-from registration_core.report import nothing_seen, outcome, progress, verdict
+from registration_core.report import certainty, nothing_seen, outcome, progress, verdict
 from registration_core.search import Search
 from registration_core.seeding import seed_of
-from registration_core.selection import is_settled
+from registration_core.selection import is_settled, judge
 from registration_core.snap_config import SnapConfig
 
 
@@ -84,24 +84,29 @@ def snap_steps(
 
 
 def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
-    """The fast method: polish the start; where that does not settle it, propose, then anneal and polish ever
-    fewer modes, then choose.
+    """The fast method: polish the start; until a candidate stands out, propose, anneal and polish ever fewer
+    modes, and choose among all that were found.
     """
     config = search.problem.config
-    iterations = len(config.stages) + 3
-    near = np.concatenate([search.problem.prior.start[None], search.polished_start()])
-    judgement = search.judged(near, len(near) - 1)
-    if is_settled(judgement, near, config.selection):
-        yield verdict(search, 1, near, judgement)
+    iterations = 2 + len(config.rounds) * (1 + len(config.stages))
+    candidates = np.concatenate([search.problem.prior.start[None], search.polished_start()])
+    near, counts = len(candidates) - 1, search.evidence(candidates)
+    judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
+    if is_settled(judgement, candidates, config.selection):
+        yield verdict(search, 1, candidates, judgement)
         return
-    yield progress(search, 1, iterations, near)
-    poses, scores = search.proposals()
-    yield progress(search, 2, iterations, poses[:625])
-    for iteration, stage in enumerate(config.stages, start=3):
-        poses, scores = search.refined(poses, scores, stage)
-        yield progress(search, iteration, iterations, poses)
-    candidates = np.concatenate([near, poses])
-    yield verdict(search, iterations, candidates, search.judged(candidates, len(near) - 1))
+    yield progress(search, 1, iterations, candidates)
+    iteration = 1
+    for share in config.rounds:
+        for poses in search.round(share):
+            iteration += 1
+            yield progress(search, iteration, iterations, poses)
+        candidates = np.concatenate([candidates, poses])
+        counts = np.concatenate([counts, search.evidence(poses)])
+        judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
+        if certainty(search, candidates, judgement) > config.certain:
+            break
+    yield verdict(search, iteration + 1, candidates, judgement)
 
 
 def _filter_steps(search: Search) -> Iterator[SnapStep]:
@@ -111,7 +116,7 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
         problem.model, problem.depth, problem.camera, problem.start[:3, 3],
         problem.config.observation.reach, config,
     )  # fmt: skip
-    spread = Noise(float(problem.prior.translation), float(problem.prior.rotation))
+    spread = Noise(*problem.spread)
     noise = Noise(config.noise_translation, config.noise_rotation)
     poses = initial_poses(problem.start, spread, config.particles, search.rng)
     particle_filter = ParticleFilter(likelihood, noise, poses, search.rng)

@@ -221,6 +221,10 @@ class SnapConfig:
     """Proposals of which the distinct modes are taken."""
     agreement: AgreementConfig = field(default_factory=AgreementConfig)
     stages: tuple[StageConfig, ...] = DEFAULT_STAGES
+    rounds: tuple[float, ...] = (0.4, 0.6)
+    """Shares of the proposals that are drawn and refined one after the other ..."""
+    certain: float = 0.97
+    """... until the confidence is higher than this."""
     anywhere: AnywhereConfig = field(default_factory=AnywhereConfig)
     selection: SelectionConfig = field(default_factory=SelectionConfig)
     confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)

@@ -13,7 +13,6 @@ from registration_core.agreement import Prior, heavy_tails, surface_of
 from registration_core.camera import Intrinsics
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Hypothesis, WorldEstimate
-from registration_core.evidence import evidence
 from registration_core.kernels import Array32, centred, from_rows, to_rows, uncentred
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.object_model import ObjectModel
@@ -63,15 +62,11 @@ class Sighting:
 
     def evidence(self, T_world: Array) -> Array:
         """Evidence (N, COUNT) of poses (N, 4, 4) in the world."""
-        problem = self.search.problem
-        distance = float(problem.start[2, 3])
-        return evidence(self.rows(T_world), problem.model, self.search.observation.grid, distance)
+        return self.search.evidence(self.rows(T_world))
 
     def modes(self) -> Array:
         """What the search in this view finds, (N, 4, 4), in the world."""
-        poses, values = self.search.proposals()
-        for stage in self.search.problem.config.stages:
-            poses, values = self.search.refined(poses, values, stage)
+        *_, poses = self.search.round(1.0)
         return pose.inverse(self.T_camera_world) @ pose.orthonormalised(from_rows(poses))
 
 

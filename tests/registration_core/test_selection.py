@@ -30,6 +30,12 @@ def shifted(T, x=0.0, z=0.0):
     return moved
 
 
+def judged(candidates, model, grid, prior, config):
+    """The judgement among a start, one polish of it, and other modes."""
+    counts = evidence(candidates, model, grid, prior.start[2, 3])
+    return judge(candidates, counts, 1, prior, config)
+
+
 def start_at(T):
     return Prior(to_rows(T)[0], f4(0.04), f4(0.5))
 
@@ -38,7 +44,7 @@ def test_true_mode_replaces_a_wrong_start(scene) -> None:
     model, grid, truth = scene
     start = pose.perturbed(truth, 0.05, 0.4, np.random.default_rng(0))
     candidates = to_rows(np.stack([start, start, truth]))
-    verdict = judge(candidates, 1, model, grid, start_at(start), SnapConfig().selection)
+    verdict = judged(candidates, model, grid, start_at(start), SnapConfig().selection)
     assert verdict.winner == 2
     assert verdict.scores[2] > verdict.scores[0]
 
@@ -46,14 +52,14 @@ def test_true_mode_replaces_a_wrong_start(scene) -> None:
 def test_equals_leave_the_operator_in_place(scene) -> None:
     model, grid, truth = scene
     candidates = to_rows(np.stack([truth, truth, shifted(truth, x=0.001)]))
-    assert judge(candidates, 1, model, grid, start_at(truth), SnapConfig().selection).winner == 0
+    assert judged(candidates, model, grid, start_at(truth), SnapConfig().selection).winner == 0
 
 
 def test_good_start_is_not_given_up_for_a_far_mode(scene) -> None:
     model, grid, truth = scene
     far = [pose.perturbed(truth, 0.06, 1.0, np.random.default_rng(k)) for k in range(20)]
     candidates = to_rows(np.stack([truth, truth, *far]))
-    assert judge(candidates, 1, model, grid, start_at(truth), SnapConfig().selection).winner == 0
+    assert judged(candidates, model, grid, start_at(truth), SnapConfig().selection).winner == 0
 
 
 def test_share_that_matches_falls_with_the_distance_from_the_truth(scene) -> None:
@@ -82,10 +88,10 @@ def test_a_good_start_is_settled_and_a_bad_one_is_not(scene) -> None:
     for start, settled in ((shifted(truth, x=0.002), True), (shifted(truth, x=0.05), False)):
         candidates = to_rows(np.stack([start, truth if settled else start]))
         assert (
-            is_settled(judge(candidates, 1, model, grid, start_at(start), config), candidates, config)
+            is_settled(judged(candidates, model, grid, start_at(start), config), candidates, config)
             is settled
         )
     far = to_rows(np.stack([shifted(truth, x=0.03), truth]))
-    judgement = judge(far, 1, model, grid, start_at(shifted(truth, x=0.03)), config)
+    judgement = judged(far, model, grid, start_at(shifted(truth, x=0.03)), config)
     assert judgement.winner == 1
     assert not is_settled(judgement, far, config)
