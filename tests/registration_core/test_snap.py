@@ -151,7 +151,7 @@ def test_paper_filter_improves_the_position(scene) -> None:
     estimate = run(scene, start, config)
     before = pose.distance(start, scene.truth).translation
     assert pose.distance(estimate.T_camera_object, scene.truth).translation < 0.5 * before
-    assert estimate.evaluations == 300 * 60
+    assert estimate.evaluations >= 300 * 60
 
 
 def test_hidden_object_keeps_the_operators_pose_with_low_confidence(scene) -> None:
