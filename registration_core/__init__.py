@@ -3,7 +3,7 @@
 from registration_core.camera import Intrinsics
 from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
-from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
+from registration_core.estimate import Ambiguity, Estimate, Hypothesis, SnapStep, WorldEstimate
 from registration_core.global_search import propose
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
@@ -14,6 +14,7 @@ from registration_core.symmetry_search import find_symmetries
 from registration_core.views import snap_views
 
 __all__ = [
+    "Ambiguity",
     "Correspondence",
     "Estimate",
     "Hypothesis",

@@ -1,5 +1,7 @@
 """How likely the result is right: the mass of the winning mode and the share of it that was measured."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,8 +57,12 @@ def grouped(
 
 
 def confidence(mass: float, counts: Array, config: ConfidenceConfig) -> float:
-    """Probability in [0, 1] that the MSSD is below 5 % of the diameter, for the evidence (COUNT,) of the
-    winner.
+    """Probability in [0, 1] that the MSSD is below 5 % of the diameter: the belief in the winning mode, times
+    how often a mode that fits as well is right.
+
+    Args:
+        mass: share of the belief that the mode has.
+        counts: (evidence.COUNT,), of the winner.
     """
-    logit = config.intercept + config.mass * mass + config.match * float(match_shares(counts[None])[0])
-    return float(1.0 / (1.0 + np.exp(-logit)))
+    logit = config.intercept + config.match * float(match_shares(counts[None])[0])
+    return mass / (1.0 + math.exp(-logit))

@@ -1,6 +1,7 @@
 """What a snap returns."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,19 @@ class Hypothesis:
     """(4, 4)."""
     weight: float
     """Share of the belief, in [0, 1]; all hypotheses of an estimate sum to 1."""
+
+
+@dataclass(frozen=True)
+class Ambiguity:
+    """Something about a pose that the depth does not tell."""
+
+    kind: Literal["other mode", "free motion"]
+    """Another mode of like weight, or a motion that changes nothing that is seen."""
+    motion: Literal["turn", "shift"]
+    axis: tuple[float, ...]
+    """(3,), direction in the mesh frame: about which the object could be turned, or along which shifted."""
+    extent: float
+    """Radians or metres: how far off the other mode is, or the standard deviation of the free motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +50,8 @@ class Estimate:
     """Hypotheses compared with the image."""
     converged: bool
     """Whether the search settled: False where there was too little evidence to go on."""
+    ambiguities: tuple[Ambiguity, ...]
+    """What the depth does not tell about the pose; other modes first."""
     seed: int
     """`snap(..., rng=np.random.default_rng(seed))` with the same inputs gives this estimate again."""
 

@@ -5,6 +5,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from registration_core.ambiguity import ambiguities
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.kernels import Array32, from_rows, to_rows
@@ -86,19 +87,25 @@ def _final(
     search: Search, iteration: int, modes: Array32, masses: Array, belief: float, converged: bool
 ) -> SnapStep:
     problem = search.problem
-    poses = [problem.uncentred(T) for T in from_rows(modes)]
+    centred = from_rows(modes)
+    poses = [problem.uncentred(T) for T in centred]
     if np.array_equal(modes[0], problem.prior.start):
         poses[0] = problem.T_camera_object  # kept as it came, without the rounding of float32
+    hypotheses = tuple(Hypothesis(T, float(mass)) for T, mass in zip(poses, masses, strict=True))
+    hessian, model = search.hessian(modes[0]), problem.model
     estimate = Estimate(
         T_camera_object=poses[0],
         confidence=belief,
-        covariance=covariance(
-            search.hessian(modes[0]),
-            modes[0][:, :3].astype(np.float64),
-            problem.model.radius,
-            problem.model.centre,
+        covariance=covariance(hessian, poses[0][:3, :3], model.radius, model.centre),
+        hypotheses=hypotheses,
+        ambiguities=ambiguities(
+            hypotheses,
+            centred[0],
+            hessian,
+            lambda T: search.evidence(to_rows(T)),
+            model,
+            problem.config.selection,
         ),
-        hypotheses=tuple(Hypothesis(T, float(mass)) for T, mass in zip(poses, masses, strict=True)),
         seconds=time.perf_counter() - search.started,
         evaluations=search.evaluations,
         converged=converged,

@@ -146,17 +146,15 @@ class SelectionConfig:
 
 @dataclass(frozen=True)
 class ConfidenceConfig:
-    """Logistic calibration of the confidence (confidence.py)."""
+    """Calibration of the confidence (confidence.py)."""
 
-    temperature: float = 1.0
-    """Of the softmax that shares the mass among the modes."""
+    temperature: float = 0.4
+    """Of the softmax that shares the belief among the modes."""
     mode_radius: float = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
-    intercept: float = -9.54
-    mass: float = 6.29
-    """Weight of the share of the belief that the winning mode has."""
-    match: float = 8.88
-    """Weight of the share of the claimed surface that was measured where it should be."""
+    intercept: float = -5.66
+    match: float = 11.05
+    """Logistic weight of the share of the claimed surface that was measured where it should be."""
 
 
 @dataclass(frozen=True)

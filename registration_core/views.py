@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from registration_core import pose
 from registration_core.agreement import Prior, heavy_tails, surface_of
+from registration_core.ambiguity import ambiguities
 from registration_core.camera import Intrinsics
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Hypothesis, WorldEstimate
@@ -108,7 +109,7 @@ def snap_views(
     candidates = _candidates(seen, start, known)
     prior = seen[0].search.problem.prior
     tails = heavy_tails(to_rows(candidates), Prior(to_rows(start)[0], prior.translation, prior.rotation))
-    counts = np.sum([sighting.evidence(candidates) for sighting in seen], axis=0)
+    counts = _evidence(seen, candidates)
     values = scores(counts, tails, config.selection)
     winner = chosen(values, len(NEAR_TUKEY), config.selection)
     if match_shares(counts[[winner]])[0] < config.selection.min_match:
@@ -161,7 +162,7 @@ def _candidates(sightings: list[Sighting], start: Array, model: ViewpointModel) 
     rows = to_rows(found)
     move_to_nearest_twin(rows, model.symmetries, to_rows(start)[0])
     found = _polished(pose.orthonormalised(from_rows(rows)), sightings, JOINT_ITERATIONS, JOINT_TUKEY)
-    counts = np.sum([sighting.evidence(found) for sighting in sightings], axis=0)
+    counts = _evidence(sightings, found)
     agreement = match_shares(counts).astype(np.float32)
     kept = distinct(to_rows(found), agreement, MODES, *NICHE)
     return np.concatenate([start[None], *near, found[kept]])
@@ -188,6 +189,11 @@ def _polished(poses: Array, sightings: list[Sighting], iterations: int, tukey: t
     return poses
 
 
+def _evidence(sightings: list[Sighting], T_world: Array) -> Array:
+    """Evidence (N, COUNT) of poses (N, 4, 4) in all views together."""
+    return np.sum([sighting.evidence(T_world) for sighting in sightings], axis=0)
+
+
 def _hessian(sightings: list[Sighting], T_world: Array) -> Array:
     """The Hessian (6, 6) of all views together, as `polish.systems` scales it."""
     return np.sum([sighting.systems(T_world[None], FINAL_TUKEY)[0][0] for sighting in sightings], axis=0)
@@ -202,13 +208,24 @@ def _estimate(
     seed: int,
     started: float,
 ) -> WorldEstimate:
-    model = sightings[0].search.problem.model
+    problem = sightings[0].search.problem
+    model = problem.model
     poses = [uncentred(T, model.centre) for T in modes]
+    hypotheses = tuple(Hypothesis(T, float(mass)) for T, mass in zip(poses, masses, strict=True))
+    hessian = _hessian(sightings, modes[0])
     return WorldEstimate(
         T_camera_object=poses[0],
         confidence=belief,
-        covariance=covariance(_hessian(sightings, modes[0]), modes[0][:3, :3], model.radius, model.centre),
-        hypotheses=tuple(Hypothesis(T, float(mass)) for T, mass in zip(poses, masses, strict=True)),
+        covariance=covariance(hessian, modes[0][:3, :3], model.radius, model.centre),
+        hypotheses=hypotheses,
+        ambiguities=ambiguities(
+            hypotheses,
+            modes[0],
+            hessian,
+            lambda T: _evidence(sightings, T),
+            model,
+            problem.config.selection,
+        ),
         seconds=time.perf_counter() - started,
         evaluations=sum(sighting.search.evaluations for sighting in sightings),
         converged=converged,

@@ -86,6 +86,7 @@ def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
         seconds=0.25,
         evaluations=1234,
         converged=True,
+        ambiguities=(),
         seed=5,
     )
     return SnapResult(estimate, T, "1.2.3", "a test machine")

@@ -1,0 +1,107 @@
+"""What depth cannot tell about a pose: other modes of like weight, and motions that change nothing seen."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from registration_core import pose
+from registration_core.estimate import Ambiguity, Hypothesis
+from registration_core.polish import MEASURED_NOISE
+from registration_core.selection import scores
+from registration_core.snap_config import SelectionConfig
+from registration_core.viewpoint_model import ViewpointModel
+
+Array = NDArray[np.float64]
+
+LIKE_WEIGHT = 0.5
+"""A mode with this share of the best one's weight could as well be the right one."""
+LEAST_TURN = 0.1
+"""Radians: modes whose rotations differ by less are told apart by their shift."""
+UNHELD = 0.02
+"""A motion is looked at if its standard deviation is larger than this share of the diameter."""
+PROBE = 0.1
+"""It is tried by as large a move, share of the diameter, ..."""
+UNNOTICED = 1.0
+"""... and is free if the evidence falls by less than this, log-odds."""
+KNOWN_AXIS = 0.95
+"""Cosine from which on an axis is that of a known symmetry."""
+
+
+def ambiguities(
+    hypotheses: Sequence[Hypothesis],
+    T: Array,
+    hessian: Array,
+    evidence: Callable[[Array], Array],
+    model: ViewpointModel,
+    config: SelectionConfig,
+) -> tuple[Ambiguity, ...]:
+    """What is ambiguous about the best of the hypotheses, best first.
+
+    Args:
+        T: (4, 4), the best pose, of the frame moved to the object's centre.
+        hessian: (6, 6), as `polish.systems` scales it, at that pose.
+        evidence: gives the evidence (N, COUNT) of poses (N, 4, 4) such as `T`.
+    """
+    return (*_other_modes(hypotheses), *_free_motions(T, hessian, evidence, model, config))
+
+
+def _other_modes(hypotheses: Sequence[Hypothesis]) -> list[Ambiguity]:
+    best = hypotheses[0]
+    found = []
+    for other in hypotheses[1:]:
+        if other.weight < LIKE_WEIGHT * best.weight:
+            continue
+        difference = pose.log(pose.inverse(best.T_camera_object) @ other.T_camera_object)
+        angle = float(np.linalg.norm(difference[3:]))
+        if angle >= LEAST_TURN:
+            found.append(Ambiguity("other mode", "turn", tuple(difference[3:] / angle), angle))
+        else:
+            length = float(np.linalg.norm(difference[:3]))
+            found.append(Ambiguity("other mode", "shift", tuple(difference[:3] / max(length, 1e-12)), length))
+    return found
+
+
+def _free_motions(
+    T: Array,
+    hessian: Array,
+    evidence: Callable[[Array], Array],
+    model: ViewpointModel,
+    config: SelectionConfig,
+) -> list[Ambiguity]:
+    """Principal motions that the polish does not hold and that the evidence does not notice either."""
+    variances, motions = np.linalg.eigh(
+        np.linalg.inv(hessian / MEASURED_NOISE**2 + np.eye(6) / model.radius**2)
+    )
+    found = []
+    for variance, motion in zip(variances[::-1], motions.T[::-1], strict=True):
+        if np.sqrt(variance) < UNHELD * model.diameter:
+            break
+        is_turn = np.linalg.norm(motion[3:]) > np.linalg.norm(motion[:3])
+        axis = T[:3, :3].T @ (motion[3:] if is_turn else motion[:3])
+        axis /= np.linalg.norm(axis)
+        if is_turn and _is_known(axis, model):
+            continue
+        step = np.concatenate([motion[:3], motion[3:] / model.radius]) * PROBE * model.diameter
+        tried = np.stack([T, _moved(T, step), _moved(T, -step)])
+        there, *beside = scores(evidence(tried), np.zeros(3), config)
+        if there - max(beside) < UNNOTICED:
+            extent = np.sqrt(variance) / (model.radius if is_turn else 1.0)
+            found.append(Ambiguity("free motion", "turn" if is_turn else "shift", tuple(axis), float(extent)))
+    return found
+
+
+def _moved(T: Array, step: Array) -> Array:
+    moved = T.copy()
+    moved[:3, 3] += step[:3]
+    moved[:3, :3] = Rotation.from_rotvec(step[3:]).as_matrix() @ T[:3, :3]
+    return moved
+
+
+def _is_known(axis: Array, model: ViewpointModel) -> bool:
+    """Whether there are small turns about this axis (3,) among the object's symmetries."""
+    turns = Rotation.from_matrix(model.symmetries[1:, :, :3].astype(np.float64)).as_rotvec()
+    angles = np.linalg.norm(turns, axis=1)
+    small = (angles > 1e-6) & (angles < 0.5)
+    return bool((np.abs(turns[small] @ axis) > KNOWN_AXIS * angles[small]).any())
