@@ -21,10 +21,11 @@ Array = NDArray[np.float64]
 
 NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
 """Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
-SHOWN = 625
-"""Proposals that are shown as progress, at most."""
 NEAR_ITERATIONS = 14
 """Steps of each of them."""
+
+SHOWN = 625
+"""Proposals that are shown as progress, at most."""
 
 
 @dataclass(eq=False)
@@ -48,12 +49,12 @@ class Search:
             share: of all proposals that are drawn, and of all modes that are kept.
         """
         config = self.problem.config
+        share = min(1.0, max(0.0, share))
+        count = max(1, round(share * self._most_proposals()))
         poses = around_start(
-            self.problem.search, self.surface, self.observation.grid, config.proposals,
-            int(share * self._most_proposals()), self.rng,
-        )  # fmt: skip
-        kept = int(share * config.wide_kept)
-        poses, agreement = ranked(poses, self.weighed(poses), kept)
+            self.problem.search, self.surface, self.observation.grid, config.proposals, count, self.rng
+        )
+        poses, agreement = ranked(poses, self.weighed(poses), max(1, int(share * config.wide_kept)))
         yield poses[:SHOWN]
         for stage in config.stages:
             fewer = dataclasses.replace(stage, modes=max(1, int(share * stage.modes)))
@@ -64,7 +65,7 @@ class Search:
         """Fewer where the caller says that the start is close."""
         config, (translation, rotation) = self.problem.config, self.problem.spread
         share = translation * rotation / (config.spread.translation * config.spread.rotation)
-        return int(min(1.0, max(config.proposals.least_share, share)) * config.proposals.count)
+        return round(min(1.0, max(config.proposals.least_share, share)) * config.proposals.count)
 
     def weighed(self, poses: Array32) -> Array32:
         """Agreement (N,) of proposals (N, 3, 4), of which none is exact yet."""

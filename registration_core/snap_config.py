@@ -74,7 +74,7 @@ class ProposalConfig:
 
 @dataclass(frozen=True)
 class AgreementConfig:
-    """Weights of the sparse agreement (likelihood.py)."""
+    """Weights of the sparse agreement (agreement.py)."""
 
     free: float = 1.5
     """Of surface claimed where the sensor saw through."""

@@ -1,5 +1,6 @@
 """The contract of `snap`: it recovers poses, does no harm, repeats itself, refuses bad input by name."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -143,6 +144,20 @@ def test_steps_lead_to_the_estimate(scene, config) -> None:
         assert 0.0 <= step.confidence <= 1.0
         assert step.particles.shape[1:] == (4, 4)
         pose.checked(step.T_camera_object, "T_camera_object")
+
+
+def test_a_good_start_is_settled_at_once_and_another_takes_rounds(scene) -> None:
+    def taken(start, **changes) -> int:
+        config = dataclasses.replace(SnapConfig(), **changes)
+        return len(
+            list(snap_steps(scene.model, scene.depth, scene.camera, start, config, np.random.default_rng(0)))
+        )
+
+    good, bad = started(scene, 0.002, 2, 0), started(scene, 0.05, 30, 0)
+    a_round = 1 + len(SnapConfig().stages)
+    assert taken(good) == 1
+    assert taken(bad) == 2 + a_round
+    assert taken(bad, certain=1.0) == 2 + 2 * a_round
 
 
 def test_paper_filter_improves_the_position(scene) -> None:
