@@ -34,7 +34,7 @@ RUN pip install --no-cache-dir --no-deps --no-build-isolation --editable . \
 
 USER snap6d
 # on a processor of another kind numba compiles them again at the first start
-RUN python -c "from registration_core.snap import warm_up; warm_up()"
+RUN python -c "from registration_core.compilation import warm_up; warm_up()"
 
 VOLUME /var/lib/snap6d
 EXPOSE 8000

@@ -1,13 +1,14 @@
 """What depth cannot tell about a pose: other modes of like weight, and motions that change nothing seen."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from registration_core import pose
-from registration_core.estimate import Ambiguity, Hypothesis
+from registration_core.estimate import Ambiguity
+from registration_core.kernels import from_rows
 from registration_core.polish import MEASURED_NOISE
 from registration_core.selection import scores
 from registration_core.snap_config import SelectionConfig
@@ -30,35 +31,33 @@ KNOWN_AXIS = 0.95
 
 
 def ambiguities(
-    hypotheses: Sequence[Hypothesis],
-    T: Array,
+    modes: Array,
+    masses: Array,
     hessian: Array,
     evidence: Callable[[Array], Array],
     model: ViewpointModel,
     config: SelectionConfig,
 ) -> tuple[Ambiguity, ...]:
-    """What is ambiguous about the best of the hypotheses, best first.
+    """What is ambiguous about the best of the modes (N, 4, 4), which comes first.
 
     Args:
-        T: (4, 4), the best pose, of the frame moved to the object's centre.
-        hessian: (6, 6), as `polish.systems` scales it, at that pose.
-        evidence: gives the evidence (N, COUNT) of poses (N, 4, 4) such as `T`.
+        modes: poses of the frame moved to the object's centre.
+        masses: (N,), the share of the belief that each has.
+        hessian: (6, 6), as `polish.systems` scales it, at the best mode.
+        evidence: gives the evidence (N, COUNT) of poses (N, 4, 4) such as these.
     """
-    return (*_other_modes(hypotheses), *_free_motions(T, hessian, evidence, model, config))
+    return (*_other_modes(modes, masses, model), *_free_motions(modes[0], hessian, evidence, model, config))
 
 
-def _other_modes(hypotheses: Sequence[Hypothesis]) -> list[Ambiguity]:
-    best = hypotheses[0]
+def _other_modes(modes: Array, masses: Array, model: ViewpointModel) -> list[Ambiguity]:
     found = []
-    for other in hypotheses[1:]:
-        if other.weight < LIKE_WEIGHT * best.weight:
-            continue
-        difference = pose.log(pose.inverse(best.T_camera_object) @ other.T_camera_object)
-        angle = float(np.linalg.norm(difference[3:]))
+    for mode in modes[1:][masses[1:] >= LIKE_WEIGHT * masses[0]]:
+        twins = pose.inverse(modes[0]) @ mode @ from_rows(model.symmetries)
+        difference = min((pose.log(twin) for twin in twins), key=lambda twist: np.linalg.norm(twist[3:]))
+        angle, length = float(np.linalg.norm(difference[3:])), float(np.linalg.norm(difference[:3]))
         if angle >= LEAST_TURN:
             found.append(Ambiguity("other mode", "turn", tuple(difference[3:] / angle), angle))
         else:
-            length = float(np.linalg.norm(difference[:3]))
             found.append(Ambiguity("other mode", "shift", tuple(difference[:3] / max(length, 1e-12)), length))
     return found
 

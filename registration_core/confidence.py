@@ -1,9 +1,8 @@
 """How likely the result is right: the mass of the winning mode and the share of it that was measured."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from registration_core.kernels import Array32
 from registration_core.modes import distances
@@ -23,6 +22,7 @@ def modes_of(poses: Array32, model: ViewpointModel, radius: float) -> NDArray[np
     apart = np.empty((len(poses), len(poses)), np.float32)
     distances(poses, model.extremes, model.symmetries, apart)
     close = apart < radius * model.diameter
+    np.fill_diagonal(close, True)
     mode = np.full(len(poses), -1, dtype=np.intp)
     for i in range(len(poses)):
         if mode[i] < 0:
@@ -65,4 +65,4 @@ def confidence(mass: float, counts: Array, config: ConfidenceConfig) -> float:
         counts: (evidence.COUNT,), of the winner.
     """
     logit = config.intercept + config.match * float(match_shares(counts[None])[0])
-    return mass / (1.0 + math.exp(-logit))
+    return mass * float(expit(logit))

@@ -72,7 +72,7 @@ class SnapStep:
     iteration: int
     """From 1 on."""
     iterations: int
-    """How many there will be."""
+    """How many there will be at most."""
     T_camera_object: Array
     """(4, 4), the best pose so far."""
     confidence: float

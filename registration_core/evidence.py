@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from registration_core.kernels import EXACT, Array32, f4
-from registration_core.observation import Grid
+from registration_core.observation import NEAREST, Grid
 from registration_core.rasterizer import draw_mesh
 from registration_core.viewpoint_model import ViewpointModel
 
@@ -48,7 +48,7 @@ def evidence(poses: Array32, model: ViewpointModel, grid: Grid, distance: float)
         poses.astype(np.float64), model.coarse_vertices, model.coarse_faces, not model.coarse_is_closed, grid,
         counts,
     )  # fmt: skip
-    return counts / (model.mean_area * float(grid.fx) * float(grid.fy) / distance**2)
+    return counts / (model.mean_area * float(grid.fx) * float(grid.fy) / max(distance, NEAREST) ** 2)
 
 
 @njit(**EXACT)

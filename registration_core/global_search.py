@@ -12,7 +12,7 @@ from registration_core.confidence import grouped
 from registration_core.estimate import Hypothesis
 from registration_core.kernels import from_rows, to_rows
 from registration_core.object_model import ObjectModel
-from registration_core.observation import observe_region
+from registration_core.observation import FARTHEST, observe_region
 from registration_core.problem import Problem, checked_depth
 from registration_core.proposals import anywhere
 from registration_core.search import Search, ranked
@@ -57,9 +57,10 @@ def propose(
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
     part = image[top:bottom, left:right]
-    if not (part > 0).any():
+    measured = part[(part > 0) & (part < FARTHEST)]
+    if not len(measured):
         return ()
-    distance = float(np.median(part[part > 0]))
+    distance = float(np.median(measured))
     observation = observe_region(
         image, camera, (left, top, right, bottom), distance, known, config.observation, rng
     )

@@ -1,6 +1,8 @@
 # mypy: allow-untyped-defs
 """The paper's likelihood of a pose hypothesis: Eq. 3 to 5 on rendered depth images."""
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +23,12 @@ class Likelihood(Protocol):
     def __call__(self, T_camera_centre: NDArray[np.float64]) -> NDArray[np.float64]:
         """Log-weights (N,) of hypotheses (N, 4, 4); -inf where a hypothesis has no support at all."""
         ...
+
+
+THREADS = os.cpu_count() or 1
+"""Over which hypotheses are shared; each is weighed by itself, so that their number changes no weight."""
+
+_threads = ThreadPoolExecutor(THREADS, "likelihood")
 
 
 class RenderedLikelihood:
@@ -56,13 +64,20 @@ class RenderedLikelihood:
 
     def __call__(self, T_camera_centre: NDArray[np.float64]) -> NDArray[np.float64]:
         weights = np.empty(len(T_camera_centre))
-        rendered_agreement(
-            np.ascontiguousarray(T_camera_centre),
-            self._vertices, self._faces, self._both_sides, self._radius,
-            self._depth, *self._camera, self._config.epsilon, self._config.alpha, self._config.beta, weights,
-        )  # fmt: skip
+        parts = zip(
+            np.array_split(np.ascontiguousarray(T_camera_centre), THREADS),
+            np.array_split(weights, THREADS),
+            strict=True,
+        )
+        list(_threads.map(self._weigh, *zip(*parts, strict=True)))
         with np.errstate(divide="ignore"):
             return np.log(weights)
+
+    def _weigh(self, T_camera_centre: NDArray[np.float64], weights: NDArray[np.float64]) -> None:
+        rendered_agreement(
+            T_camera_centre, self._vertices, self._faces, self._both_sides, self._radius, self._depth,
+            *self._camera, self._config.epsilon, self._config.alpha, self._config.beta, weights,
+        )  # fmt: skip
 
 
 def strides(model: ViewpointModel, camera: Intrinsics, distance: float, pixels: int) -> tuple[int, int]:

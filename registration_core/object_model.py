@@ -69,7 +69,7 @@ class ObjectModel:
     """A triangle mesh in metres, in the frame of its file.
 
     Raises:
-        ValueError: where the mesh is empty or holds a number that is not finite.
+        ValueError: where the mesh is empty, has no area, or holds a number that is not finite.
     """
 
     vertices: Array
@@ -85,6 +85,8 @@ class ObjectModel:
             raise ValueError("mesh vertices must be finite numbers; there is a NaN or an infinity")
         if self.faces.min() < 0 or self.faces.max() >= len(self.vertices):
             raise ValueError("mesh faces must point at its vertices; one points outside")
+        if not trimesh.triangles.area(self.vertices[self.faces]).sum() > 0.0:
+            raise ValueError("mesh must have a surface; the area of its faces is 0")
 
     @classmethod
     def load(cls, path: str | Path, unit: str = "m", symmetries: Symmetries | None = None) -> "ObjectModel":

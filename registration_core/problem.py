@@ -40,7 +40,7 @@ class Problem:
 
     model: ViewpointModel
     depth: NDArray[np.float32]
-    """(H, W), metres, 0 = no measurement."""
+    """(H, W), metres; what is not a positive number counts as not measured."""
     camera: Intrinsics
     T_camera_object: Array
     """(4, 4), the operator's pose."""
@@ -48,7 +48,7 @@ class Problem:
     """(4, 4), the same as `T_camera_centre`."""
     prior: Prior
     search: Prior
-    """The same, as wide as proposals are drawn."""
+    """The Gaussian that proposals are drawn from: `spread` times `config.spread.search`."""
     config: SnapConfig
 
     @property
@@ -94,7 +94,7 @@ def region_of_interest(
     """(left, top, width, height) of the pixels that a snap from this pose may look at.
 
     A snap on that part of the image, with `camera.cropped(...)`, gives the same estimate as one on the
-    whole image.
+    whole image, if the part holds any measurement: an image without any is refused.
 
     Raises:
         ValueError: where the pose is none, or the object lies wholly outside the image.
@@ -108,7 +108,7 @@ def region_of_interest(
 
 
 def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
-    """The depth image (H, W) as float32; what is not a positive number in it counts as not measured.
+    """The depth image (H, W) as float32, as it is; what is not a positive number counts as not measured.
 
     Raises:
         ValueError: where its shape is not the camera's, it holds no depth, or it seems to be in millimetres.

@@ -126,6 +126,8 @@ def _anywhere(pixels, surface, grid, state, out):
         T[:] = f4(0)
         T[0, 0] = T[1, 1] = T[2, 2] = f4(1)
         a, b, c = surface.normals[view, 0, k], surface.normals[view, 1, k], surface.normals[view, 2, k]
+        if a * a + b * b + c * c == f4(0):  # a flat object seen edge-on shows no side
+            c = f4(1)
         ox, oy, oz = grid.normals[0, row, column], grid.normals[1, row, column], grid.normals[2, row, column]
         ax, ay, az = b * oz - c * oy, c * ox - a * oz, a * oy - b * ox
         sine = np.sqrt(ax * ax + ay * ay + az * az)

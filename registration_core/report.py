@@ -24,8 +24,8 @@ PARTICLE_TEMPERATURE = 0.03
 
 
 def progress(search: Search, iteration: int, iterations: int, poses: Array32) -> SnapStep:
-    """A step with the hypotheses alive, (N, 3, 4), best first; its confidence takes the best one's mode for
-    the only.
+    """A step with the hypotheses alive, (N, 3, 4), the one judged best first; its confidence takes that one's
+    mode for the only.
     """
     counts = search.evidence(poses[:1])[0]
     return SnapStep(
@@ -99,8 +99,8 @@ def _final(
         covariance=covariance(hessian, poses[0][:3, :3], model.radius, model.centre),
         hypotheses=hypotheses,
         ambiguities=ambiguities(
-            hypotheses,
-            centred[0],
+            centred,
+            masses,
             hessian,
             lambda T: search.evidence(to_rows(T)),
             model,

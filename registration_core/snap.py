@@ -95,15 +95,16 @@ def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
     if is_settled(judgement, candidates, config.selection):
         yield verdict(search, 1, candidates, judgement)
         return
-    yield progress(search, 1, iterations, candidates)
-    iteration = 1
+    iteration, best = 1, candidates[[judgement.winner]]
+    yield progress(search, iteration, iterations, best)
     for share in config.rounds:
         for poses in search.round(share):
             iteration += 1
-            yield progress(search, iteration, iterations, poses)
+            yield progress(search, iteration, iterations, np.concatenate([best, poses]))
         candidates = np.concatenate([candidates, poses])
         counts = np.concatenate([counts, search.evidence(poses)])
         judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
+        best = candidates[[judgement.winner]]
         if certainty(search, candidates, judgement) > config.certain:
             break
     yield verdict(search, iteration + 1, candidates, judgement)

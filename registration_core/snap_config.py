@@ -1,13 +1,9 @@
-"""Every constant of a snap, in small nested records with a default for each."""
+"""The constants of a snap that can be set, in small nested records with a default for each."""
 
-import dataclasses
-import math
-import typing
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
-MAX_COUNT = 1_000_000
-"""No count in a configuration may be larger: it comes from outside."""
+from registration_core.config_values import merged, plain
 
 
 @dataclass(frozen=True)
@@ -153,6 +149,7 @@ class ConfidenceConfig:
     mode_radius: float = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
     intercept: float = -5.66
+    """Logit of being right for a pose of which nothing matches."""
     match: float = 11.05
     """Logistic weight of the share of the claimed surface that was measured where it should be."""
 
@@ -204,7 +201,7 @@ DEFAULT_STAGES = (
 
 @dataclass(frozen=True)
 class SnapConfig:
-    """All constants of a snap; the defaults are the fast method."""
+    """All constants of a snap that can be set; the defaults are the fast method."""
 
     method: Literal["viewpoint", "particle_filter"] = "viewpoint"
     """Sparse viewpoint model with polished modes, or the paper's particle filter on rendered depth."""
@@ -235,7 +232,7 @@ class SnapConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """All fields as JSON values."""
-        return _plain(self)
+        return plain(self)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "SnapConfig":
@@ -251,54 +248,4 @@ class SnapConfig:
         preset = values.pop("preset", "default")
         if not isinstance(preset, str) or preset not in presets:
             raise ValueError(f"config.preset must be one of {', '.join(presets)}; it is {preset!r}")
-        return _merged(presets[preset], values, "config")
-
-
-def _plain(value: Any) -> Any:
-    if dataclasses.is_dataclass(value):
-        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-    return [_plain(item) for item in value] if isinstance(value, tuple) else value
-
-
-def _merged(base: Any, values: Any, name: str) -> Any:
-    """The dataclass `base` with `values` in place of its fields."""
-    if not isinstance(values, dict):
-        raise ValueError(f"{name} must be an object of named fields; it is {values!r}")
-    kinds = typing.get_type_hints(type(base))
-    for key in values:
-        if key not in kinds:
-            raise ValueError(f"{name}.{key} is no field; there are {', '.join(kinds)}")
-    changes = {
-        key: _checked(kinds[key], getattr(base, key), value, f"{name}.{key}") for key, value in values.items()
-    }
-    return dataclasses.replace(base, **changes)
-
-
-def _checked(kind: Any, base: Any, value: Any, name: str) -> Any:
-    """`value` as a field of type `kind`, whose value so far is `base`."""
-    if dataclasses.is_dataclass(kind):
-        return _merged(base, value, name)
-    if typing.get_origin(kind) is Literal:
-        if value not in typing.get_args(kind):
-            raise ValueError(f"{name} must be one of {', '.join(typing.get_args(kind))}; it is {value!r}")
-        return value
-    if typing.get_origin(kind) is tuple:
-        return _checked_items(typing.get_args(kind)[0], base, value, name)
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if kind is int:
-        if not is_number or not isinstance(value, int) or not 1 <= value <= MAX_COUNT:
-            raise ValueError(f"{name} must be a whole number from 1 to {MAX_COUNT}; it is {value!r}")
-        return value
-    assert kind is float
-    if not is_number or not math.isfinite(value):
-        raise ValueError(f"{name} must be a finite number; it is {value!r}")
-    return float(value)
-
-
-def _checked_items(kind: Any, base: Any, value: Any, name: str) -> Any:
-    if not isinstance(value, list | tuple) or not value:
-        raise ValueError(f"{name} must be a list with at least one item; it is {value!r}")
-    if kind is float and len(value) != len(base):
-        raise ValueError(f"{name} must have {len(base)} numbers; it has {len(value)}")
-    last = len(base) - 1
-    return tuple(_checked(kind, base[min(i, last)], item, f"{name}[{i}]") for i, item in enumerate(value))
+        return merged(presets[preset], values, "config")

@@ -42,9 +42,6 @@ HIGHEST_FOLD = 12
 PRIMES = (2, 3, 5, 7, 11)
 """Each of those axes is also one of such an order."""
 
-LEAST_AREA = 1e-9
-"""Of a surface, squared diameters: less is rounding."""
-
 PLANE_DIRECTIONS = 60
 """Axes tried in a plane of like spread: 3 degrees apart."""
 
@@ -112,8 +109,6 @@ def find_symmetries(
     model = ObjectModel(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))
     triangles = model.vertices[model.faces]
     areas = trimesh.triangles.area(triangles)
-    if areas.sum() < LEAST_AREA * model.diameter**2:
-        raise ValueError("mesh must have a surface; the area of its faces is 0")
     centroid = np.average(triangles.mean(axis=1), axis=0, weights=areas)
     surface = surface_of((model.vertices - centroid) / model.diameter, model.faces)
     spreads, axes = principal_axes((triangles - centroid) / model.diameter, areas)

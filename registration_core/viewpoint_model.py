@@ -40,6 +40,8 @@ CLUSTER_CELLS = 200
 """Cells along the diameter to which a dense mesh is thinned first, which is fast, before it is decimated."""
 SYMMETRY_STEP = 0.1
 """Step of continuous symmetries, share of the diameter: fine enough to tell modes apart."""
+DAMAGED = (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile)
+"""What reading a damaged or outdated cache file may raise."""
 CACHED_MODELS = 64
 """Models kept in memory, about 5 MB each."""
 
@@ -144,7 +146,7 @@ def _load_or_build(model: ObjectModel, cache_dir: Path | None) -> ViewpointModel
         return build_viewpoint_model(model)
     path = cache_dir / f"{model.content_hash}.v{VERSION}.npz"
     if path.is_file():
-        with contextlib.suppress(OSError, ValueError, KeyError, zipfile.BadZipFile):  # damaged: build it anew
+        with contextlib.suppress(*DAMAGED):  # damaged: build it anew
             return _read(path)
     built = build_viewpoint_model(model)
     _write(path, built)

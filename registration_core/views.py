@@ -81,9 +81,11 @@ def snap_views(
 ) -> WorldEstimate:
     """Refine the operator's pose of an object against several depth images of a scene that stands still.
 
+    Every view is searched in one whole round: there is no early stop.
+
     Args:
-        views: depth (H, W) in metres, camera and `T_world_camera` (4, 4) of each; those that do not show the
-            object are left out.
+        views: depth (H, W) in metres, camera and `T_world_camera` (4, 4) of each; those whose image the
+            object lies outside of are left out.
         T_world_object: (4, 4), the operator's pose.
         config: `SnapConfig()` where it is None; the fast method is the only one.
         rng: as for `snap`.
@@ -111,8 +113,9 @@ def snap_views(
     tails = heavy_tails(to_rows(candidates), Prior(to_rows(start)[0], prior.translation, prior.rotation))
     counts = _evidence(seen, candidates)
     values = scores(counts, tails, config.selection)
+    shares = counts / len(seen)
     winner = chosen(values, len(NEAR_TUKEY), config.selection)
-    if match_shares(counts[[winner]])[0] < config.selection.min_match:
+    if match_shares(shares[[winner]])[0] < config.selection.min_match:
         return _estimate(seen, start[None], np.ones(1), UNSEEN_CONFIDENCE, False, seed, started)
     if winner > 0:
         candidates[winner] = eased(
@@ -121,7 +124,7 @@ def snap_views(
     modes, masses = grouped(
         to_rows(candidates), winner, values / config.confidence.temperature, known, config.confidence
     )
-    belief = confidence(float(masses[0]), counts[winner] / len(seen), config.confidence)
+    belief = confidence(float(masses[0]), shares[winner], config.confidence)
     return _estimate(seen, candidates[modes], masses, belief, True, seed, started)
 
 
@@ -163,7 +166,7 @@ def _candidates(sightings: list[Sighting], start: Array, model: ViewpointModel) 
     move_to_nearest_twin(rows, model.symmetries, to_rows(start)[0])
     found = _polished(pose.orthonormalised(from_rows(rows)), sightings, JOINT_ITERATIONS, JOINT_TUKEY)
     counts = _evidence(sightings, found)
-    agreement = match_shares(counts).astype(np.float32)
+    agreement = match_shares(counts / len(sightings)).astype(np.float32)
     kept = distinct(to_rows(found), agreement, MODES, *NICHE)
     return np.concatenate([start[None], *near, found[kept]])
 
@@ -219,8 +222,8 @@ def _estimate(
         covariance=covariance(hessian, modes[0][:3, :3], model.radius, model.centre),
         hypotheses=hypotheses,
         ambiguities=ambiguities(
-            hypotheses,
-            modes[0],
+            modes,
+            masses,
             hessian,
             lambda T: _evidence(sightings, T),
             model,

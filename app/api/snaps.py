@@ -94,7 +94,7 @@ def request_snap(seat: SeatDep, identity: IdentityDep, body: NewSnap | None = No
     try:
         config = SnapConfig.from_dict(wanted.config or {})
     except ValueError as error:
-        raise InputError(f"config: {error}.") from error
+        raise InputError(f"body.{error}.") from error
     given = "start_spread" in wanted.model_fields_set
     spread = wanted.start_spread if given else Unsaid.FROM_DRAGS
     return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed, spread))

@@ -6,7 +6,7 @@ import httpx
 
 from tests.app.waiting import wait_until
 
-SLOW_SNAP = {"preset": "paper", "particle_filter": {"iterations": 20_000, "particles": 50}}
+SLOW_SNAP = {"preset": "paper", "particle_filter": {"iterations": 10_000, "particles": 200}}
 """A configuration that runs for a long time in small steps."""
 
 

@@ -17,7 +17,7 @@ from tests.processes import Server, command_line, descendants, serving
 
 pytestmark = pytest.mark.e2e
 
-SLOW_SNAP = {"preset": "paper", "particle_filter": {"iterations": 20_000, "particles": 50}}
+SLOW_SNAP = {"preset": "paper", "particle_filter": {"iterations": 10_000, "particles": 200}}
 """Runs for a long time in small steps."""
 NEXT_PICTURE = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 """Resolves when the 3-D view has drawn what it knows."""

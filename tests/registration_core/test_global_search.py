@@ -48,6 +48,13 @@ def test_looks_in_the_region_only(scene) -> None:
         assert pose.distance(hypothesis.T_camera_object, scene.truth).translation > 0.05
 
 
+def test_infinite_depth_is_not_measured(scene, found) -> None:
+    depth = np.where(scene.depth > 0, scene.depth, np.inf)
+    depth[:20] = np.inf
+    best = propose(scene.model, depth, scene.camera, rng=np.random.default_rng(0))[0]
+    assert pose.distance(best.T_camera_object, scene.truth).translation < 0.004
+
+
 def test_empty_region_proposes_nothing(scene) -> None:
     depth = scene.depth.copy()
     depth[:50, :50] = 0.0

@@ -116,3 +116,11 @@ def test_hash_follows_content() -> None:
     assert model_of(other).content_hash != same.content_hash
     turned = model_of(BOX, discrete([np.diag([1.0, -1.0, -1.0, 1.0])]))
     assert turned.content_hash != same.content_hash
+
+
+def test_mesh_without_a_surface_is_refused() -> None:
+    corners = np.asarray(BOX.vertices, dtype=np.float64)
+    with pytest.raises(ValueError, match="mesh must have a surface"):
+        ObjectModel(corners, np.array([[0, 0, 1], [7, 7, 0]], dtype=np.int32))
+    with pytest.raises(ValueError, match="mesh must have a surface"):
+        ObjectModel(np.zeros_like(corners), np.asarray(BOX.faces, dtype=np.int32))

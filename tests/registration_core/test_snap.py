@@ -146,6 +146,20 @@ def test_steps_lead_to_the_estimate(scene, config) -> None:
         pose.checked(step.T_camera_object, "T_camera_object")
 
 
+def test_start_in_the_plane_of_the_camera_is_kept_with_low_confidence(scene) -> None:
+    start = pose.from_rotation_translation(np.eye(3), -scene.model.centre)
+    estimate = run(scene, start)
+    assert estimate.confidence < 0.1
+    np.testing.assert_allclose(estimate.T_camera_object, start)
+
+
+def test_steps_begin_with_the_best_pose_so_far(scene) -> None:
+    start = started(scene, 0.05, 30, 0)
+    steps = snap_steps(scene.model, scene.depth, scene.camera, start, rng=np.random.default_rng(0))
+    for step in steps:
+        np.testing.assert_allclose(step.particles[0], step.T_camera_object, atol=1e-5)
+
+
 def test_a_good_start_is_settled_at_once_and_another_takes_rounds(scene) -> None:
     def taken(start, **changes) -> int:
         config = dataclasses.replace(SnapConfig(), **changes)

@@ -7,7 +7,7 @@ import pytest
 from registration_core import SnapConfig
 
 
-@pytest.mark.parametrize("config", [SnapConfig(), SnapConfig.paper()])
+@pytest.mark.parametrize("config", [SnapConfig(), SnapConfig.paper(), SnapConfig(rounds=(1.0,))])
 def test_survives_json(config) -> None:
     assert SnapConfig.from_dict(json.loads(json.dumps(config.to_dict()))) == config
 
@@ -42,7 +42,19 @@ def test_stages_may_be_fewer() -> None:
         ({"proposals": {"count": True}}, "config.proposals.count"),
         ({"proposals": {"count": 0}}, "config.proposals.count"),
         ({"proposals": {"count": 10**9}}, "config.proposals.count"),
-        ({"proposals": {"scales": [1.0]}}, "config.proposals.scales"),
+        ({"selection": {"ring": [1.0]}}, "config.selection.ring"),
+        ({"rounds": [0.1] * 17}, "config.rounds"),
+        ({"rounds": [-0.1]}, r"config.rounds\[0\]"),
+        ({"confidence": {"mode_radius": 0}}, "config.confidence.mode_radius"),
+        ({"confidence": {"temperature": 0.0}}, "config.confidence.temperature"),
+        ({"confidence": {"intercept": -1e9}}, "config.confidence.intercept"),
+        ({"spread": {"translation": 0}}, "config.spread.translation"),
+        ({"spread": {"search": -1}}, "config.spread.search"),
+        ({"stages": [{"niche_translation": 0}]}, r"config.stages\[0\].niche_translation"),
+        ({"stages": [{"iterations": 10**6}]}, r"config.stages\[0\].iterations"),
+        ({"particle_filter": {"alpha": -1}}, "config.particle_filter.alpha"),
+        ({"observation": {"reach": -0.5}}, "config.observation.reach"),
+        ({"wide_epsilon": 10**400}, "config.wide_epsilon"),
         ({"proposals": {"scales": [1.0, "a", 1.0, 1.0]}}, r"config.proposals.scales\[1\]"),
         ({"wide_epsilon": "2 cm"}, "config.wide_epsilon"),
         ({"wide_epsilon": float("nan")}, "config.wide_epsilon"),
@@ -56,3 +68,9 @@ def test_stages_may_be_fewer() -> None:
 def test_wrong_fields_are_named(values, name) -> None:
     with pytest.raises(ValueError, match=name):
         SnapConfig.from_dict(values)
+
+
+def test_a_long_wrong_value_is_cut_short() -> None:
+    with pytest.raises(ValueError, match="wide_epsilon") as caught:
+        SnapConfig.from_dict({"wide_epsilon": "x" * 5000})
+    assert len(str(caught.value)) < 200
