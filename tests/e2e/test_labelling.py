@@ -160,7 +160,7 @@ def test_a_snap_can_be_cancelled(desk: Desk) -> None:
 
 def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk) -> None:
     page = desk.page
-    quick = {"preset": "paper", "particle_filter": {"iterations": 1500, "particles": 50}}
+    quick = {"preset": "paper", "particle_filter": {"iterations": 4000, "particles": 200}}
     assert page.request.post(f"{desk.url}/snaps", data={"config": quick}).ok
     desk.drag("ty", 0.02)
     desk.events("snap_offered")
