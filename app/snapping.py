@@ -135,7 +135,9 @@ class Snapper:
         if pending is None:
             return
         model = pending.model if with_model else None
-        future = self._client.result().submit(worker.run_snap, pending.job, model, pure=False)
+        future = self._client.result().submit(
+            worker.run_snap, pending.job, model, self._cache_dir, pure=False
+        )
         pending.future = future
         if self._find(snap_id) is None:  # cancelled in this moment
             self._stop(pending)

@@ -1,6 +1,7 @@
 """What runs inside a worker process.
 
-A worker needs no shared files: a job brings the depth it looks at, and an object comes once and is kept.
+A worker needs no shared files: a job brings the depth it looks at, and an object comes once and is kept. One
+on the application's own machine is told of a folder, too, for what it builds of an object and may need again.
 """
 
 import platform
@@ -57,8 +58,12 @@ class JobResult:
     hardware: str
 
 
-def run_snap(job: SnapJob, model: ObjectModel | None) -> JobResult | None:
+def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = None) -> JobResult | None:
     """Run one snap, telling how far it is and stopping when it is cancelled.
+
+    Args:
+        model: The object, where it has to be sent.
+        cache_dir: Where a worker, which may be the one before this, keeps what it built of objects.
 
     Returns:
         None where the object was not sent and is not known here: the job has to come again with it.
@@ -67,12 +72,10 @@ def run_snap(job: SnapJob, model: ObjectModel | None) -> JobResult | None:
         SnapCancelledError: where `cancel` was called meanwhile.
         ValueError: where the job is bad, as `registration_core.snap` says.
     """
-    if model is not None:
-        _keep(model)
-    elif job.model_hash not in _models:
+    known = model or _models.get(job.model_hash)
+    if known is None:
         return None
-    known = _models[job.model_hash]
-    _models.move_to_end(job.model_hash)
+    prepare(known, cache_dir)
     reported = 0.0
     estimate = None
     rng = np.random.default_rng(job.seed)

@@ -6,6 +6,7 @@ without rendering. The idea is that of sparse viewpoint models in region-based t
 """
 
 import contextlib
+import logging
 import os
 import tempfile
 import threading
@@ -22,6 +23,8 @@ from registration_core.kernels import Array32, f4
 from registration_core.mesh_reduction import clustered, decimated, is_closed, merged
 from registration_core.object_model import ObjectModel
 from registration_core.viewpoint_drawing import draw_views
+
+logger = logging.getLogger(__name__)
 
 VERSION = 2
 """Part of the cache file's name: raised when the content of the model changes."""
@@ -40,8 +43,8 @@ CLUSTER_CELLS = 200
 """Cells along the diameter to which a dense mesh is thinned first, which is fast, before it is decimated."""
 SYMMETRY_STEP = 0.1
 """Step of continuous symmetries, share of the diameter: fine enough to tell modes apart."""
-DAMAGED = (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile)
-"""What reading a damaged or outdated cache file may raise."""
+UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile)
+"""What reading a missing, damaged or outdated cache file may raise."""
 CACHED_MODELS = 64
 """Models kept in memory, about 5 MB each."""
 
@@ -145,11 +148,13 @@ def _load_or_build(model: ObjectModel, cache_dir: Path | None) -> ViewpointModel
     if cache_dir is None:
         return build_viewpoint_model(model)
     path = cache_dir / f"{model.content_hash}.v{VERSION}.npz"
-    if path.is_file():
-        with contextlib.suppress(*DAMAGED):  # damaged: build it anew
-            return _read(path)
+    with contextlib.suppress(*UNREADABLE):  # build it, or build it anew
+        return _read(path)
     built = build_viewpoint_model(model)
-    _write(path, built)
+    try:
+        _write(path, built)
+    except OSError as error:  # a full disk costs time later, and no snap now
+        logger.warning("a viewpoint model could not be cached: %s", error)
     return built
 
 
@@ -164,9 +169,10 @@ def _read(path: Path) -> ViewpointModel:
 def _write(path: Path, viewpoints: ViewpointModel) -> None:
     """Write beside the target and rename, so that another process never reads half a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".tmp", delete=False) as file:
-        np.savez(file, **{f.name: getattr(viewpoints, f.name) for f in fields(viewpoints)})
-    os.replace(file.name, path)
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        whole = Path(folder) / path.name
+        np.savez(whole, **{f.name: getattr(viewpoints, f.name) for f in fields(viewpoints)})
+        os.replace(whole, path)
 
 
 def _view_rotations(directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -83,6 +83,22 @@ def knowing(snapper: Snapper, digest: str) -> int:
     return sum(snapper._client.result().run(knows).values())
 
 
+def addresses(snapper: Snapper) -> list[str]:
+    """Of the workers that are there now."""
+    return list(snapper._client.result().scheduler_info(n_workers=-1)["workers"])
+
+
+def forbid_building(snapper: Snapper) -> None:
+    """Let every worker fail that builds what it needs of an object."""
+
+    def forbid() -> None:
+        from registration_core import viewpoint_model
+
+        viewpoint_model.build_viewpoint_model = None
+
+    snapper._client.result().run(forbid)
+
+
 def request(snapper: Snapper, job: SnapJob, model: ObjectModel) -> tuple[Outcome, Callable[[], None]]:
     outcome = Outcome()
     return outcome, snapper.request(job, model, outcome.on_progress, outcome.on_end)
@@ -186,6 +202,27 @@ def test_a_worker_that_dies_in_mid_snap_fails_that_snap_only(snapper, model):
         outcome, _ = request(snapper, new_job(model, snapper.topic), model)
         assert isinstance(result_of(outcome), JobResult)
     wait_until(lambda: snapper.worker_count() == 2, "another worker in its place")
+
+
+def test_a_restarted_worker_reads_what_the_one_before_it_built(tmp_path):
+    model = new_model()
+    alone = Snapper("", 1, tmp_path)
+    try:
+        alone.prepare(model)
+        wait_until(lambda: knowing(alone, model.content_hash) == 1, "the worker to be prepared")
+        wait_until(lambda: busy(alone) == 0, "the worker to be idle")
+        (address,) = addresses(alone)
+        os.kill(*pids(alone), signal.SIGKILL)
+        wait_until(lambda: addresses(alone) not in ([], [address]), "another worker in its place")
+        assert knowing(alone, model.content_hash) == 0
+        forbid_building(alone)
+        outcome, _ = request(alone, new_job(model, alone.topic), model)
+        assert isinstance(result_of(outcome), JobResult)
+        other = new_model()
+        outcome, _ = request(alone, new_job(other, alone.topic), other)
+        assert isinstance(result_of(outcome), SnapError)  # so building was forbidden indeed
+    finally:
+        alone.close()
 
 
 def test_without_a_scheduler_a_snap_says_so(model, tmp_path):

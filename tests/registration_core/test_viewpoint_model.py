@@ -116,6 +116,18 @@ def test_is_built_once_and_read_back_from_its_file(tmp_path, monkeypatch) -> Non
     assert [path.suffix for path in tmp_path.iterdir()] == [".npz"]
 
 
+def test_what_cannot_be_written_is_built_all_the_same(tmp_path, monkeypatch, caplog) -> None:
+    def fail(*_: object) -> None:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(module, "_models", type(module._models)())
+    monkeypatch.setattr(module.os, "replace", fail)
+    model = tool()
+    assert viewpoint_model(model, tmp_path).diameter == model.diameter
+    assert "could not be cached: the disk is full" in caplog.text
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_damaged_file_is_built_anew(tmp_path, monkeypatch) -> None:
     model = tool()
     monkeypatch.setattr(module, "_models", type(module._models)())
