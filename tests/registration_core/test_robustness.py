@@ -143,6 +143,14 @@ def subdivided(times: int) -> Callable[[ObjectModel], ObjectModel]:
     return change
 
 
+def a_million(model: ObjectModel) -> ObjectModel:
+    """1.4 million faces: the first of the tool's boxes is subdivided once more than the others."""
+    vertices, faces = trimesh.remesh.subdivide(model.vertices, model.faces, face_index=np.arange(12))
+    model = subdivided(7)(ObjectModel(vertices, np.asarray(faces, dtype=np.int32)))
+    assert len(model.faces) > 1_000_000
+    return model
+
+
 def with_faces(
     change: Callable[[NDArray[np.int32]], NDArray[np.int32]],
 ) -> Callable[[ObjectModel], ObjectModel]:
@@ -184,7 +192,7 @@ def torn(model: ObjectModel) -> ObjectModel:
 MESHES = {
     "48 faces": subdivided(0),
     "12,000 faces": subdivided(4),
-    "800,000 faces": subdivided(7),
+    "1,400,000 faces": a_million,
     "open": bottomless,
     "pierced": with_faces(lambda faces: faces[~some(faces, 0.05)]),
     "flipped": with_faces(flipped),
