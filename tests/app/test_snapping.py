@@ -225,6 +225,17 @@ def test_a_restarted_worker_reads_what_the_one_before_it_built(tmp_path):
         alone.close()
 
 
+def test_workers_of_a_cluster_need_no_folder(cluster, tmp_path):
+    elsewhere, model = Snapper(cluster, 1, tmp_path), new_model()
+    outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
+    assert isinstance(result_of(outcome), JobResult)
+    elsewhere.prepare(other := new_model())
+    wait_until(lambda: knowing(elsewhere, other.content_hash) == 2, "the workers to be prepared")
+    wait_until(lambda: busy(elsewhere) == 0, "the workers to be idle")
+    elsewhere.close()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_without_a_scheduler_a_snap_says_so(model, tmp_path):
     with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
         alone = Snapper("tcp://127.0.0.1:1", 1, tmp_path)
