@@ -43,8 +43,6 @@ class Observation:
     """What a snap sees."""
 
     grid: Grid
-    block: int
-    """Pixels of the depth image along a side of a pixel of the grid."""
     measured: int
     """Pixels of the grid with depth within reach of the object."""
 
@@ -132,7 +130,7 @@ def observe_region(
     if plane[4] > least:
         _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
     near = np.abs(reduced - distance) < model.radius + config.reach
-    return Observation(grid, block, int(np.count_nonzero(near & (reduced > 0))))
+    return Observation(grid, int(np.count_nonzero(near & (reduced > 0))))
 
 
 @njit(**FAST)

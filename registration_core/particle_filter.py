@@ -33,11 +33,6 @@ class Particles:
     log_weights: Array
     """(N,), up to a common constant."""
 
-    @property
-    def best(self) -> Array:
-        """Eq. 2: the pose (4, 4) of the largest weight."""
-        return self.poses[int(np.argmax(self.log_weights))]
-
 
 def spread(poses: Array, noise: Noise, rng: np.random.Generator) -> Array:
     """Poses (N, 4, 4), each moved by Gaussian noise."""

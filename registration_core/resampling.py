@@ -26,11 +26,6 @@ def normalised(log_weights: Array) -> Array:
     return weights / weights.sum()
 
 
-def effective_number(weights: Array) -> float:
-    """N_eff = 1 / sum w^2 of normalised weights (N,): N if all are equal, 1 if one has everything."""
-    return float(1.0 / np.sum(np.square(weights)))
-
-
 def systematic(weights: Array, rng: np.random.Generator, count: int | None = None) -> NDArray[np.intp]:
     """Indices (count,) drawn by systematic resampling: each particle floor or ceil of count * weight times.
 

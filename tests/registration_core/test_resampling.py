@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from registration_core.resampling import effective_number, normalised, systematic
+from registration_core.resampling import normalised, systematic
 
 log_weights = arrays(np.float64, st.integers(1, 60), elements=st.floats(-50, 50))
 
@@ -30,12 +30,6 @@ def test_all_without_support_weigh_the_same() -> None:
 def test_normalised_refuses_what_is_no_log_weight(values) -> None:
     with pytest.raises(ValueError, match="log_weights"):
         normalised(np.array(values, dtype=np.float64))
-
-
-def test_effective_number_of_known_weights() -> None:
-    assert effective_number(np.full(8, 1 / 8)) == pytest.approx(8.0)
-    assert effective_number(np.array([1.0, 0.0, 0.0])) == pytest.approx(1.0)
-    assert effective_number(np.array([0.5, 0.5, 0.0])) == pytest.approx(2.0)
 
 
 @given(log_weights, st.integers(1, 200), st.integers(0, 2**32))
