@@ -12,7 +12,7 @@ from benchmarks.registration.instances import HALF, HIDDEN, Instance, synthetic_
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.starts import FAR, MIDDLE, Shell, starts
 from registration_core import SnapConfig, snap, warm_up
-from registration_core.snap_config import StageConfig
+from registration_core.snap_config import RoundConfig, StageConfig
 
 TITLE = "Ablation: ADD(-S) < 10 % on synthetic scenes, from 5 cm/30° and 10 cm/60° together"
 
@@ -45,7 +45,10 @@ def variants() -> list[Variant]:
     return [
         Variant("the default", DEFAULT),
         Variant("spread of the start told", DEFAULT, is_told=True),
-        Variant("one round, no early stop", replace(DEFAULT, rounds=(1.0,), certain=1.0)),
+        Variant("the first round only", replace(DEFAULT, rounds=DEFAULT.rounds[:1])),
+        Variant("the first two rounds", replace(DEFAULT, rounds=DEFAULT.rounds[:2])),
+        Variant("all rounds, however sure", replace(DEFAULT, rounds=tuple(map(always, DEFAULT.rounds)))),
+        Variant("no round wider", replace(DEFAULT, rounds=tuple(map(no_wider, DEFAULT.rounds)))),
         Variant("half of the proposals", replace(DEFAULT, proposals=replace(proposals, count=7_000))),
         Variant("twice the proposals", replace(DEFAULT, proposals=replace(proposals, count=28_000))),
         Variant(
@@ -76,6 +79,16 @@ def variants() -> list[Variant]:
             "no lead demanded", replace(DEFAULT, selection=replace(selection, gain_near=0.0, gain_far=0.0))
         ),
     ]
+
+
+def always(one: RoundConfig) -> RoundConfig:
+    """Never left out."""
+    return replace(one, doubt=1.0)
+
+
+def no_wider(one: RoundConfig) -> RoundConfig:
+    """As wide as the first."""
+    return replace(one, widening=1.0)
 
 
 def fewer_modes(stage: StageConfig) -> StageConfig:

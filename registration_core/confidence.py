@@ -1,4 +1,4 @@
-"""How likely the result is right: the mass of the winning mode and the share of it that was measured."""
+"""How likely the result is right: the mass of the winning mode, and how well it fits by itself."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from scipy.special import expit
 
 from registration_core.kernels import Array32
 from registration_core.modes import distances
-from registration_core.selection import match_shares
+from registration_core.selection import match_shares, shown_shares
 from registration_core.snap_config import ConfidenceConfig
 from registration_core.viewpoint_model import ViewpointModel
 
@@ -56,13 +56,15 @@ def grouped(
     return order[np.unique(modes)][best_first], masses[best_first]
 
 
-def confidence(mass: float, counts: Array, config: ConfidenceConfig) -> float:
+def confidence(mass: float, score: float, counts: Array, config: ConfidenceConfig) -> float:
     """Probability in [0, 1] that the MSSD is below 5 % of the diameter: the belief in the winning mode, times
-    how often a mode that fits as well is right.
+    how often a mode of such a score, match and visibility is right.
 
     Args:
         mass: share of the belief that the mode has.
+        score: log-odds of the winner, as `selection.scores` gives them.
         counts: (evidence.COUNT,), of the winner.
     """
-    logit = config.intercept + config.match * float(match_shares(counts[None])[0])
+    match, shown = float(match_shares(counts[None])[0]), float(shown_shares(counts[None])[0])
+    logit = config.intercept + config.score * score + config.match * match + config.shown * shown
     return mass * float(expit(logit))

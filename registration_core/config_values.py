@@ -13,10 +13,12 @@ LARGEST = 1e6
 SMALL = 1e-6
 LEAST = {
     **dict.fromkeys(("translation", "rotation", "search", "belief", "temperature", "mode_radius"), SMALL),
-    **dict.fromkeys(("niche_translation", "niche_rotation", "tukey_start", "tukey_end", "epsilon"), SMALL),
+    **dict.fromkeys(
+        ("niche_translation", "niche_rotation", "tukey_start", "tukey_end", "epsilon", "widening"), SMALL
+    ),
     **dict.fromkeys(("wide_epsilon", "depth_gap", "plane_tolerance", "max_shift", "max_turn"), SMALL),
     **dict.fromkeys(("reach", "noise_translation", "noise_rotation", "alpha", "beta", "scales"), 0.0),
-    **dict.fromkeys(("rounds", "plane_weight", "gaussian_share", "ray_share", "least_share"), 0.0),
+    **dict.fromkeys(("share", "doubt", "plane_weight", "gaussian_share", "ray_share", "least_share"), 0.0),
 }
 """Numbers that must not be smaller than this, by the name of their field."""
 FIXED_LENGTH = ("off_plane", "on_plane", "ring")

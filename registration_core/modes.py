@@ -5,7 +5,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from registration_core.kernels import FAST, Array32, f4, squared_angle_of
+from registration_core.kernels import FAST, Array32, f4, squared_angle
+
+BUCKETS = 4096
+"""Of the grid in which neighbours are looked up; a power of two."""
 
 
 def distinct(
@@ -19,22 +22,28 @@ def distinct(
     """
     order = np.argsort(-scores, kind="stable")
     chosen = np.empty(min(most, len(order)), np.intp)
-    count = _distinct(poses, order, f4(niche_translation**-2), f4(niche_rotation**-2), chosen)
+    count = _distinct(poses, order, f4(niche_translation), f4(niche_rotation), chosen)
     return chosen[:count]
 
 
 @njit(**FAST)
-def _distinct(poses, order, per_translation, per_rotation, chosen):
+def _distinct(poses, order, niche_translation, niche_rotation, chosen):
+    """Only what lies in the same cell of a grid of `niche_translation`, or in one beside it, can be nearer
+    than that: each bucket holds a list of the chosen ones in it.
+    """
+    per_translation, per_rotation = f4(1) / niche_translation, niche_rotation**-2
+    newest = np.full(BUCKETS, -1, np.int32)
+    older = np.empty(chosen.shape[0], np.int32)
     count = 0
-    kept = np.empty((12, chosen.shape[0]), np.float32)
     for candidate in order:
         T = poses[candidate]
-        if _distance_to_nearest(T, kept, count, per_translation, per_rotation) < f4(1):
+        i = int(np.floor(T[0, 3] * per_translation))
+        j = int(np.floor(T[1, 3] * per_translation))
+        k = int(np.floor(T[2, 3] * per_translation))
+        if _is_in_a_niche(T, i, j, k, poses, chosen, newest, older, per_translation**2, per_rotation):
             continue
-        for a in range(3):
-            for b in range(4):
-                kept[4 * a + b, count] = T[a, b]
-        chosen[count] = candidate
+        bucket = _bucket(i, j, k)
+        chosen[count], older[count], newest[bucket] = candidate, newest[bucket], count
         count += 1
         if count == chosen.shape[0]:
             break
@@ -42,23 +51,24 @@ def _distinct(poses, order, per_translation, per_rotation, chosen):
 
 
 @njit(**FAST)
-def _distance_to_nearest(T, kept, count, per_translation, per_rotation):
-    """Squared distance in niches to the nearest of the first `count` poses kept (12, N), one a column."""
-    a0, a1, a2, a3 = T[0, 0], T[0, 1], T[0, 2], T[0, 3]
-    b0, b1, b2, b3 = T[1, 0], T[1, 1], T[1, 2], T[1, 3]
-    c0, c1, c2, c3 = T[2, 0], T[2, 1], T[2, 2], T[2, 3]
-    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9, k10, k11 = kept
-    nearest = f4(1e9)
-    for k in range(count):
-        dx, dy, dz = a3 - k3[k], b3 - k7[k], c3 - k11[k]
-        trace = (
-            a0 * k0[k] + a1 * k1[k] + a2 * k2[k]
-            + b0 * k4[k] + b1 * k5[k] + b2 * k6[k]
-            + c0 * k8[k] + c1 * k9[k] + c2 * k10[k]
-        )  # fmt: skip
-        distance = (dx * dx + dy * dy + dz * dz) * per_translation
-        nearest = min(nearest, distance + squared_angle_of(trace) * per_rotation)
-    return nearest
+def _is_in_a_niche(T, i, j, k, poses, chosen, newest, older, per_translation, per_rotation):
+    for di in range(-1, 2):
+        for dj in range(-1, 2):
+            for dk in range(-1, 2):
+                n = newest[_bucket(i + di, j + dj, k + dk)]
+                while n >= 0:
+                    other = poses[chosen[n]]
+                    x, y, z = T[0, 3] - other[0, 3], T[1, 3] - other[1, 3], T[2, 3] - other[2, 3]
+                    apart = (x * x + y * y + z * z) * per_translation
+                    if apart < f4(1) and apart + squared_angle(T, other) * per_rotation < f4(1):
+                        return True
+                    n = older[n]
+    return False
+
+
+@njit(**FAST, inline="always")
+def _bucket(i, j, k):
+    return (i * 73856093 ^ j * 19349663 ^ k * 83492791) & (BUCKETS - 1)
 
 
 @njit(**FAST)

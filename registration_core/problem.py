@@ -58,7 +58,7 @@ class Problem:
         return float(self.search.translation) / factor, float(self.search.rotation) / factor
 
     def uncentred(self, T_camera_centre: Array) -> Array:
-        """`T_camera_object` of a pose (4, 4), exactly rigid."""
+        """`T_camera_object` of poses (..., 4, 4), exactly rigid."""
         return uncentred(pose.orthonormalised(T_camera_centre), self.model.centre)
 
     def uncentred_particles(self, rows: Array32) -> Array:

@@ -9,6 +9,9 @@ from registration_core.kernels import FAST, Array32, f4, normal, random_state, t
 from registration_core.observation import Grid
 from registration_core.snap_config import ProposalConfig
 
+LARGEST_TURN = 2.8
+"""Radians: the axis of a turn onto an almost opposite normal is not known."""
+
 
 def around_start(
     prior: Prior,
@@ -29,7 +32,7 @@ def around_start(
 
 
 @njit(**FAST)
-def _around_start(  # noqa: PLR0915 - one loop, for speed
+def _around_start(
     start,
     translation,
     rotation,
@@ -52,7 +55,7 @@ def _around_start(  # noqa: PLR0915 - one loop, for speed
     """
     height, width = grid.depth.shape
     fx, fy, cx, cy = grid.fx, grid.fy, grid.cx, grid.cy
-    turned = np.empty((3, 4), np.float32)
+    least_cosine = np.cos(min(max_turn, f4(LARGEST_TURN)))
     out[0] = start
     for i in range(1, out.shape[0]):
         T = out[i]
@@ -60,30 +63,30 @@ def _around_start(  # noqa: PLR0915 - one loop, for speed
         r, s = rotation * scale, translation * scale
         turn(start, r * normal(state), r * normal(state), r * normal(state), T)
         kind = uniform(state)
+        is_gaussian = kind < gaussian_share
+        view = view_of(T, surface.view_of_cell)
+        k = int(uniform(state) * surface.points.shape[2])
+        x, y, z = turned_vector(T, surface.points[view, :, k])
         anchored = False
-        view = k = row = column = 0
-        x = y = z = seen = f4(0)
-        for _ in range(tries):
+        row = column = 0
+        seen = f4(0)
+        for _ in range(1 if is_gaussian else tries):
             T[0, 3] = start[0, 3] + s * normal(state)
             T[1, 3] = start[1, 3] + s * normal(state)
             T[2, 3] = start[2, 3] + s * normal(state)
-            if kind < gaussian_share:
-                break
-            view_now = view_of(T, surface.view_of_cell)
-            k_now = int(uniform(state) * surface.points.shape[2])
-            px, py, pz = turned_vector(T, surface.points[view_now, :, k_now])
-            depth = pz + T[2, 3]
-            if depth < f4(0.05):
+            depth = z + T[2, 3]
+            if is_gaussian or depth < f4(0.05):
                 continue
-            column_now = int(np.floor((px + T[0, 3]) / depth * fx + cx + f4(0.5)))
-            row_now = int(np.floor((py + T[1, 3]) / depth * fy + cy + f4(0.5)))
+            per_depth = f4(1) / depth
+            column_now = int(np.floor((x + T[0, 3]) * per_depth * fx + cx + f4(0.5)))
+            row_now = int(np.floor((y + T[1, 3]) * per_depth * fy + cy + f4(0.5)))
             if column_now < 0 or row_now < 0 or column_now >= width or row_now >= height:
                 continue
             seen_now = grid.depth[row_now, column_now]
             if seen_now <= f4(0) or abs(seen_now - depth) > max_shift:
                 continue
             anchored = True
-            view, k, row, column, x, y, z, seen = view_now, k_now, row_now, column_now, px, py, pz, seen_now
+            row, column, seen = row_now, column_now, seen_now
             if grid.weight[row, column] > f4(0.5):
                 break
         if not anchored:
@@ -91,13 +94,8 @@ def _around_start(  # noqa: PLR0915 - one loop, for speed
         ox, oy, oz = grid.normals[0, row, column], grid.normals[1, row, column], grid.normals[2, row, column]
         if kind > gaussian_share + ray_share and ox * ox + oy * oy + oz * oz > f4(0):
             a, b, c = turned_vector(T, surface.normals[view, :, k])
-            ax, ay, az = b * oz - c * oy, c * ox - a * oz, a * oy - b * ox
-            sine = np.sqrt(ax * ax + ay * ay + az * az)
-            angle = np.arctan2(sine, a * ox + b * oy + c * oz)
-            if sine > f4(1e-5) and angle < max_turn:
-                share = angle / sine
-                turn(T, ax * share, ay * share, az * share, turned)
-                T[:] = turned
+            if a * ox + b * oy + c * oz > least_cosine:
+                turn_onto(T, a, b, c, ox, oy, oz)
                 x, y, z = turned_vector(T, surface.points[view, :, k])
         T[0, 3] = (f4(column) - cx) / fx * seen - x
         T[1, 3] = (f4(row) - cy) / fy * seen - y
@@ -116,8 +114,7 @@ def anywhere(surface: Surface, grid: Grid, count: int, rng: np.random.Generator)
 
 @njit(**FAST)
 def _anywhere(pixels, surface, grid, state, out):
-    T = np.zeros((3, 4), np.float32)
-    turned = np.zeros((3, 4), np.float32)
+    T, turned = np.zeros((3, 4), np.float32), np.zeros((3, 4), np.float32)
     for i in range(out.shape[0]):
         row, column = pixels[int(uniform(state) * pixels.shape[0])]
         seen = grid.depth[row, column]
@@ -129,21 +126,34 @@ def _anywhere(pixels, surface, grid, state, out):
         if a * a + b * b + c * c == f4(0):  # a flat object seen edge-on shows no side
             c = f4(1)
         ox, oy, oz = grid.normals[0, row, column], grid.normals[1, row, column], grid.normals[2, row, column]
-        ax, ay, az = b * oz - c * oy, c * ox - a * oz, a * oy - b * ox
-        sine = np.sqrt(ax * ax + ay * ay + az * az)
-        angle = np.arctan2(sine, a * ox + b * oy + c * oz)
-        if sine < f4(1e-4):  # parallel or opposite: any axis across will do
+        if a * ox + b * oy + c * oz < f4(-0.9):  # opposite, nearly: half a turn about any axis across first
             ax, ay, az = (b, -a, f4(0)) if abs(c) < f4(0.9) else (f4(0), c, -b)
-            sine = np.sqrt(ax * ax + ay * ay + az * az)
-        share = angle / sine
-        turn(T, ax * share, ay * share, az * share, turned)
+            half = f4(np.pi) / np.sqrt(ax * ax + ay * ay + az * az)
+            turn(T, ax * half, ay * half, az * half, turned)
+            T[:] = turned
+            a, b, c = -a, -b, -c
+        turn_onto(T, a, b, c, ox, oy, oz)
         spin = f4(2 * np.pi) * uniform(state)
-        turn(turned, ox * spin, oy * spin, oz * spin, T)
-        x, y, z = turned_vector(T, surface.points[view, :, k])
-        out[i] = T
+        turn(T, ox * spin, oy * spin, oz * spin, out[i])
+        x, y, z = turned_vector(out[i], surface.points[view, :, k])
         out[i, 0, 3] = (f4(column) - grid.cx) / grid.fx * seen - x
         out[i, 1, 3] = (f4(row) - grid.cy) / grid.fy * seen - y
         out[i, 2, 3] = seen - z
+
+
+@njit(**FAST, inline="always")
+def turn_onto(T, a, b, c, x, y, z):
+    """Turn T (3, 4) by the smallest rotation that takes the unit vector (a, b, c) to (x, y, z), in camera
+    axes; they must not be opposite.
+    """
+    u, v, w, cosine = b * z - c * y, c * x - a * z, a * y - b * x, a * x + b * y + c * z
+    share = f4(1) / (f4(1) + cosine)
+    for j in range(3):
+        p, q, r = T[0, j], T[1, j], T[2, j]
+        along = (u * p + v * q + w * r) * share
+        T[0, j] = cosine * p + v * r - w * q + along * u
+        T[1, j] = cosine * q + w * p - u * r + along * v
+        T[2, j] = cosine * r + u * q - v * p + along * w
 
 
 @njit(**FAST, inline="always")

@@ -5,6 +5,7 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
+from registration_core.agreement import heavy_tails
 from registration_core.ambiguity import ambiguities
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
@@ -12,7 +13,7 @@ from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct
 from registration_core.polish import covariance, eased
 from registration_core.search import Search
-from registration_core.selection import Judgement, match_shares
+from registration_core.selection import Judgement, match_shares, scores
 
 Array = NDArray[np.float64]
 
@@ -27,12 +28,12 @@ def progress(search: Search, iteration: int, iterations: int, poses: Array32) ->
     """A step with the hypotheses alive, (N, 3, 4), the one judged best first; its confidence takes that one's
     mode for the only.
     """
-    counts = search.evidence(poses[:1])[0]
+    counts = search.evidence(poses[:1])
     return SnapStep(
         iteration,
         iterations,
         search.problem.uncentred(from_rows(poses[:1])[0]),
-        confidence(1.0, counts, search.problem.config.confidence),
+        confidence(1.0, _score(search, poses[:1], counts), counts[0], search.problem.config.confidence),
         search.problem.uncentred_particles(poses),
     )
 
@@ -42,12 +43,13 @@ def verdict(search: Search, iteration: int, candidates: Array32, judgement: Judg
     first.
     """
     temperature = search.problem.config.confidence.temperature
-    winner, counts = judgement.winner, judgement.counts[judgement.winner]
+    winner = judgement.winner
+    score, counts = float(judgement.scores[winner]), judgement.counts[winner]
     if winner > 0:
         candidates = candidates.copy()
         T, hessian = from_rows(candidates[[winner]])[0], search.hessian(candidates[winner])
         candidates[winner] = to_rows(eased(T, search.problem.start, hessian, search.problem.model.radius))[0]
-    return _conclusion(search, iteration, candidates, winner, judgement.scores / temperature, counts)
+    return _conclusion(search, iteration, candidates, winner, judgement.scores / temperature, score, counts)
 
 
 def certainty(search: Search, candidates: Array32, judgement: Judgement) -> float:
@@ -55,14 +57,17 @@ def certainty(search: Search, candidates: Array32, judgement: Judgement) -> floa
     config = search.problem.config.confidence
     scores = judgement.scores / config.temperature
     _, masses = grouped(candidates, judgement.winner, scores, search.problem.model, config)
-    return confidence(float(masses[0]), judgement.counts[judgement.winner], config)
+    score = float(judgement.scores[judgement.winner])
+    return confidence(float(masses[0]), score, judgement.counts[judgement.winner], config)
 
 
 def outcome(search: Search, iteration: int, particles: Array32, log_weights: Array) -> SnapStep:
     """The last step of the particle filter: Eq. 2 over its particles (N, 3, 4), best first."""
     kept = distinct(particles, -np.arange(len(particles), dtype=np.float32), 24, 0.003, 0.05)
-    scores = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
-    return _conclusion(search, iteration, particles[kept], 0, scores, search.evidence(particles[:1])[0])
+    log_odds = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
+    counts = search.evidence(particles[:1])
+    score = _score(search, particles[:1], counts)
+    return _conclusion(search, iteration, particles[kept], 0, log_odds, score, counts[0])
 
 
 def nothing_seen(search: Search, iteration: int) -> SnapStep:
@@ -72,15 +77,32 @@ def nothing_seen(search: Search, iteration: int) -> SnapStep:
 
 
 def _conclusion(
-    search: Search, iteration: int, candidates: Array32, winner: int, scores: Array, counts: Array
+    search: Search,
+    iteration: int,
+    candidates: Array32,
+    winner: int,
+    log_odds: Array,
+    score: float,
+    counts: Array,
 ) -> SnapStep:
-    """The last step: candidates grouped into modes, the winner's first; scores (N,) are log-odds."""
+    """The last step: candidates grouped into modes, the winner's first.
+
+    Args:
+        log_odds: (N,), by which the candidates share the belief.
+        score, counts: what the evidence says of the winner.
+    """
     if match_shares(counts[None])[0] < search.problem.config.selection.min_match:
         return nothing_seen(search, iteration)
     config = search.problem.config.confidence
-    modes, masses = grouped(candidates, winner, scores, search.problem.model, config)
-    belief = confidence(float(masses[0]), counts, config)
+    modes, masses = grouped(candidates, winner, log_odds, search.problem.model, config)
+    belief = confidence(float(masses[0]), score, counts, config)
     return _final(search, iteration, candidates[modes], masses, belief, True)
+
+
+def _score(search: Search, poses: Array32, counts: Array) -> float:
+    """Log-odds of one pose (1, 3, 4) by its evidence (1, COUNT)."""
+    tails = heavy_tails(poses, search.problem.prior)
+    return float(scores(counts, tails, search.problem.config.selection)[0])
 
 
 def _final(
@@ -88,7 +110,7 @@ def _final(
 ) -> SnapStep:
     problem = search.problem
     centred = from_rows(modes)
-    poses = [problem.uncentred(T) for T in centred]
+    poses = problem.uncentred(centred)
     if np.array_equal(modes[0], problem.prior.start):
         poses[0] = problem.T_camera_object  # kept as it came, without the rounding of float32
     hypotheses = tuple(Hypothesis(T, float(mass)) for T, mass in zip(poses, masses, strict=True))
@@ -111,4 +133,4 @@ def _final(
         converged=converged,
         seed=search.seed,
     )
-    return SnapStep(iteration, iteration, poses[0], belief, np.stack(poses), estimate)
+    return SnapStep(iteration, iteration, poses[0], belief, poses, estimate)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core.agreement import Surface, agreement_weights, sparse_agreement
+from registration_core.agreement import Prior, Surface, agreement_weights, sparse_agreement
 from registration_core.evidence import evidence
 from registration_core.kernels import Array32, f4
 from registration_core.modes import distinct, move_to_nearest_twin
@@ -42,18 +42,19 @@ class Search:
     evaluations: int = 0
     """Hypotheses compared with the image so far."""
 
-    def round(self, share: float) -> Iterator[Array32]:
+    def round(self, share: float = 1.0, widening: float = 1.0) -> Iterator[Array32]:
         """Proposals, and then the modes (N, 3, 4) that every stage leaves, best first.
 
         Args:
             share: of all proposals that are drawn, and of all modes that are kept.
+            widening: proposals are drawn this many times wider than the search is said to go.
         """
         config = self.problem.config
         share = min(1.0, max(0.0, share))
         count = max(1, round(share * self._most_proposals()))
-        poses = around_start(
-            self.problem.search, self.surface, self.observation.grid, config.proposals, count, self.rng
-        )
+        start, translation, rotation = self.problem.search
+        wide = Prior(start, f4(widening * translation), f4(widening * rotation))
+        poses = around_start(wide, self.surface, self.observation.grid, config.proposals, count, self.rng)
         poses, agreement = ranked(poses, self.weighed(poses), max(1, int(share * config.wide_kept)))
         yield poses[:SHOWN]
         for stage in config.stages:

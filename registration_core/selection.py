@@ -16,6 +16,10 @@ Array = NDArray[np.float64]
 
 LEAST_CLAIM = 0.3
 """Share of the mean silhouette: no smaller a claim is trusted in `match_shares`."""
+LEAST_OUTLINE = 0.05
+"""The same for the outline in `shown_shares`."""
+HIDDEN = [evidence.OFF_PLANE, evidence.OFF_PLANE + 1, evidence.ON_PLANE, evidence.ON_PLANE + 1]
+"""Classes of pixels that something hides which lies clearly in front."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +85,18 @@ def match_shares(counts: Array) -> Array:
     """Share (N,) of the surface claimed and not hidden that was measured where it is claimed, off the plane
     or on it.
     """
-    off, on = (
-        counts[:, evidence.OFF_PLANE : evidence.ON_PLANE],
-        counts[:, evidence.ON_PLANE : evidence.UNMEASURED],
-    )
-    matched = off[:, 3:6].sum(axis=1) + 0.5 * on[:, 3]
-    claimed = (
-        counts[:, : evidence.UNMEASURED + 1].sum(axis=1) - off[:, :2].sum(axis=1) - on[:, :2].sum(axis=1)
-    )
-    return matched / np.maximum(claimed, LEAST_CLAIM)
+    on_plane = counts[:, evidence.ON_PLANE + 3]
+    matched = counts[:, evidence.OFF_PLANE + 3 : evidence.OFF_PLANE + 6].sum(axis=1) + 0.5 * on_plane
+    return matched / np.maximum(_claims(counts)[1], LEAST_CLAIM)
+
+
+def shown_shares(counts: Array) -> Array:
+    """Share (N,) of the outline's pixels that nothing in front hides."""
+    outlines, shown = _claims(counts)
+    return shown / np.maximum(outlines, LEAST_OUTLINE)
+
+
+def _claims(counts: Array) -> tuple[Array, Array]:
+    """Pixels within the outlines (N,), and those of them that are not hidden (N,)."""
+    outlines = counts[:, : evidence.RING].sum(axis=1)
+    return outlines, outlines - counts[:, HIDDEN].sum(axis=1)

@@ -97,16 +97,16 @@ def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
         return
     iteration, best = 1, candidates[[judgement.winner]]
     yield progress(search, iteration, iterations, best)
-    for share in config.rounds:
-        for poses in search.round(share):
+    for one in config.rounds:
+        if certainty(search, candidates, judgement) > one.doubt:
+            continue
+        for poses in search.round(one.share, one.widening):
             iteration += 1
             yield progress(search, iteration, iterations, np.concatenate([best, poses]))
         candidates = np.concatenate([candidates, poses])
         counts = np.concatenate([counts, search.evidence(poses)])
         judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
         best = candidates[[judgement.winner]]
-        if certainty(search, candidates, judgement) > config.certain:
-            break
     yield verdict(search, iteration + 1, candidates, judgement)
 
 

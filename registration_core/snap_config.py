@@ -62,7 +62,7 @@ class ProposalConfig:
     """Multiples of the spread that are cycled through."""
     max_shift: float = 0.15
     """A point is put on observed depth only if it is no farther off, metres."""
-    max_turn: float = 1.0
+    max_turn: float = 2.0
     """A normal is turned onto the observed one only if the angle is smaller, radians."""
     tries: int = 4
     """Draws until a point falls on a measured pixel off the plane."""
@@ -114,7 +114,7 @@ class StageConfig:
 class SelectionConfig:
     """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
 
-    prior: float = 1.59
+    prior: float = 1.7
     """Weight of the heavy-tailed prior about the start."""
     gain_near: float = 1.5
     """The polished start replaces the start only if it scores better by this much."""
@@ -128,15 +128,15 @@ class SelectionConfig:
     """... that moved no farther than this, metres, ..."""
     settled_rotation: float = 0.13
     """... and this, radians, nothing else is looked for."""
-    match_share: float = 6.9
+    match_share: float = 10.0
     """Weight of the share of the claimed surface that was measured where it is claimed."""
-    off_plane: tuple[float, ...] = (-0.3, -17.0, -28.9, -6.1, 5.1, -22.7, -26.5, -25.1, -4.9)
+    off_plane: tuple[float, ...] = (0.4, -13.6, -25.1, -14.2, 4.5, -17.3, -24.8, -23.1, -17.4)
     """Weights of pixels off the plane, by how far behind the claimed surface they were measured."""
-    on_plane: tuple[float, ...] = (-5.2, -16.7, -48.8, -16.7, -25.8, -27.6, -14.0)
+    on_plane: tuple[float, ...] = (-7.5, -19.8, -56.9, -26.0, -88.2, -40.5, -21.0)
     """The same for pixels on it."""
-    unmeasured: float = -3.0
+    unmeasured: float = 0.0
     """Weight of pixels without a measurement."""
-    ring: tuple[float, ...] = (10.0, 0.0, 10.0, 26.2, -24.7, -9.3, -8.7, 10.0)
+    ring: tuple[float, ...] = (10.0, 0.0, 10.0, 26.4, -34.7, -15.2, -22.2, 10.0)
     """Weights of what lies just beyond the outline."""
 
 
@@ -144,14 +144,18 @@ class SelectionConfig:
 class ConfidenceConfig:
     """Calibration of the confidence (confidence.py)."""
 
-    temperature: float = 0.4
+    temperature: float = 0.5
     """Of the softmax that shares the belief among the modes."""
     mode_radius: float = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
-    intercept: float = -5.66
-    """Logit of being right for a pose of which nothing matches."""
-    match: float = 11.05
-    """Logistic weight of the share of the claimed surface that was measured where it should be."""
+    intercept: float = -2.79
+    """Logit of being right for a pose of which nothing speaks, for or against."""
+    score: float = 0.433
+    """Logistic weight of its score, which the evidence and the distance from the start give it."""
+    match: float = 1.97
+    """The same of the share of the claimed surface that was measured where it should be, ..."""
+    shown: float = 2.80
+    """... and of the share that is not hidden."""
 
 
 @dataclass(frozen=True)
@@ -193,10 +197,25 @@ class AnywhereConfig:
 
 
 DEFAULT_STAGES = (
-    StageConfig(900, 0.015, 0.25, 4, 0.03, 0.012, 64, 0.010),
-    StageConfig(120, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
-    StageConfig(40, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+    StageConfig(1500, 0.015, 0.25, 4, 0.03, 0.012, 64, 0.010),
+    StageConfig(250, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
+    StageConfig(60, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
 )
+
+
+@dataclass(frozen=True)
+class RoundConfig:
+    """One search for the object about the start."""
+
+    share: float
+    """Of all proposals that are drawn, and of all modes that are kept."""
+    widening: float
+    """Proposals are drawn this many times wider than the search is said to go."""
+    doubt: float
+    """The round is left out where the confidence so far is higher than this."""
+
+
+DEFAULT_ROUNDS = (RoundConfig(0.3, 1.0, 1.0), RoundConfig(0.5, 1.4, 0.95), RoundConfig(0.6, 1.6, 0.6))
 
 
 @dataclass(frozen=True)
@@ -208,7 +227,7 @@ class SnapConfig:
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     spread: SpreadConfig = field(default_factory=SpreadConfig)
     proposals: ProposalConfig = field(default_factory=ProposalConfig)
-    wide_points: int = 64
+    wide_points: int = 40
     """Surface points of a proposal that are looked up."""
     wide_epsilon: float = 0.02
     """Distance at which agreement of a proposal ends, metres."""
@@ -216,10 +235,8 @@ class SnapConfig:
     """Proposals of which the distinct modes are taken."""
     agreement: AgreementConfig = field(default_factory=AgreementConfig)
     stages: tuple[StageConfig, ...] = DEFAULT_STAGES
-    rounds: tuple[float, ...] = (0.4, 0.6)
-    """Shares of the proposals that are drawn and refined one after the other ..."""
-    certain: float = 0.97
-    """... until the confidence is higher than this."""
+    rounds: tuple[RoundConfig, ...] = DEFAULT_ROUNDS
+    """Searched one after the other, as far as the confidence asks for it."""
     anywhere: AnywhereConfig = field(default_factory=AnywhereConfig)
     selection: SelectionConfig = field(default_factory=SelectionConfig)
     confidence: ConfidenceConfig = field(default_factory=ConfidenceConfig)

@@ -67,7 +67,7 @@ class Sighting:
 
     def modes(self) -> Array:
         """What the search in this view finds, (N, 4, 4), in the world."""
-        *_, poses = self.search.round(1.0)
+        *_, poses = self.search.round()
         return pose.inverse(self.T_camera_world) @ pose.orthonormalised(from_rows(poses))
 
 
@@ -124,7 +124,8 @@ def snap_views(
     modes, masses = grouped(
         to_rows(candidates), winner, values / config.confidence.temperature, known, config.confidence
     )
-    belief = confidence(float(masses[0]), shares[winner], config.confidence)
+    score = float(scores(shares[[winner]], tails[[winner]], config.selection)[0])
+    belief = confidence(float(masses[0]), score, shares[winner], config.confidence)
     return _estimate(seen, candidates[modes], masses, belief, True, seed, started)
 
 

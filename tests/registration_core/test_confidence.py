@@ -31,14 +31,18 @@ def shares(match: float, seen_through: float) -> np.ndarray:
     return values
 
 
-def test_confidence_rises_with_mass_and_match() -> None:
+def test_confidence_rises_with_mass_score_match_and_visibility() -> None:
     good, poor = shares(0.9, 0.0), shares(0.3, 0.6)
-    assert confidence(0.9, good, CONFIG) > confidence(0.3, good, CONFIG)
-    assert confidence(0.9, good, CONFIG) > confidence(0.9, poor, CONFIG)
-    assert confidence(1.0, good, CONFIG) > 0.9
-    assert confidence(0.2, poor, CONFIG) < 0.2
+    hidden = good.copy()
+    hidden[OFF_PLANE] = 1.5
+    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.3, 8.0, good, CONFIG)
+    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 0.0, good, CONFIG)
+    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 8.0, poor, CONFIG)
+    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 8.0, hidden, CONFIG)
+    assert confidence(1.0, 8.0, good, CONFIG) > 0.9
+    assert confidence(0.2, -8.0, poor, CONFIG) < 0.2
 
 
 @pytest.mark.parametrize("mass", [0.0, 0.5, 1.0])
 def test_confidence_of_no_pixels_at_all_is_a_probability(mass) -> None:
-    assert 0.0 <= confidence(mass, np.zeros(COUNT), CONFIG) <= 1.0
+    assert 0.0 <= confidence(mass, 0.0, np.zeros(COUNT), CONFIG) <= 1.0

@@ -26,6 +26,15 @@ def test_kept_modes_are_the_best_of_their_niches() -> None:
             assert max(scores[kept][inside]) >= scores[i]
 
 
+def test_no_kept_mode_is_in_the_niche_of_another() -> None:
+    kept = POSES[distinct(POSES, np.zeros(60, np.float32), 100, 0.02, 0.5)]
+    assert 10 < len(kept) < 60
+    assert len(distinct(kept, np.ones(len(kept), np.float32), 100, 0.02, 0.5)) == len(kept)
+    T = from_rows(kept).astype(np.float64)
+    apart = [pose.distance(a, b) for n, a in enumerate(T) for b in T[:n]]
+    assert all((d.translation / 0.02) ** 2 + (d.rotation / 0.5) ** 2 > 0.98 for d in apart)
+
+
 def test_no_more_modes_than_asked_for() -> None:
     assert len(distinct(POSES, np.zeros(60, np.float32), 7, 1e-6, 1e-6)) == 7
 

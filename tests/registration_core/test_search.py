@@ -50,6 +50,15 @@ def test_a_round_of_a_share_costs_about_that_share() -> None:
     assert len(some) == len(most) // 4
 
 
+def test_a_wider_round_proposes_farther_off() -> None:
+    off = []
+    for widening in (1.0, 2.0):
+        one = search()
+        proposals = next(one.round(1.0, widening))
+        off.append(np.median(np.linalg.norm(proposals[:, :, 3] - proposals[0, :, 3], axis=1)))
+    assert off[1] > 1.2 * off[0]
+
+
 @pytest.mark.parametrize("share", [0.0, -3.0, 1e-9, 1e9])
 def test_a_share_that_is_none_still_gives_a_round(share) -> None:
     *_, modes = search().round(share)

@@ -8,7 +8,7 @@ from registration_core.agreement import Prior
 from registration_core.evidence import evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import is_settled, judge, match_shares
+from registration_core.selection import is_settled, judge, match_shares, shown_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -80,6 +80,20 @@ def test_what_is_hidden_does_not_count_against_the_share_that_matches(scene) -> 
         for depth in (grid.depth, hidden)
     )
     assert half > 0.9 * whole
+
+
+def test_share_that_is_shown_is_that_of_the_outline_which_nothing_hides(scene) -> None:
+    model, grid, truth = scene
+    hidden = grid.depth.copy()
+    column = int(grid.fx * truth[0, 3] / truth[2, 3] + grid.cx)
+    hidden[:, :column] = 0.3
+    whole, half, none = (
+        shown_shares(evidence(to_rows(truth), model, grid._replace(depth=depth), truth[2, 3]))[0]
+        for depth in (grid.depth, hidden, np.full_like(hidden, 0.3))
+    )
+    assert whole > 0.97
+    assert 0.3 < half < 0.7
+    assert none == 0.0
 
 
 def test_a_good_start_is_settled_and_a_bad_one_is_not(scene) -> None:

@@ -161,8 +161,11 @@ def test_steps_begin_with_the_best_pose_so_far(scene) -> None:
 
 
 def test_a_good_start_is_settled_at_once_and_another_takes_rounds(scene) -> None:
-    def taken(start, **changes) -> int:
-        config = dataclasses.replace(SnapConfig(), **changes)
+    def taken(start, doubt=None) -> int:
+        config = SnapConfig()
+        if doubt is not None:
+            rounds = tuple(dataclasses.replace(one, doubt=doubt) for one in config.rounds)
+            config = dataclasses.replace(config, rounds=rounds)
         return len(
             list(snap_steps(scene.model, scene.depth, scene.camera, start, config, np.random.default_rng(0)))
         )
@@ -171,7 +174,8 @@ def test_a_good_start_is_settled_at_once_and_another_takes_rounds(scene) -> None
     a_round = 1 + len(SnapConfig().stages)
     assert taken(good) == 1
     assert taken(bad) == 2 + a_round
-    assert taken(bad, certain=1.0) == 2 + 2 * a_round
+    assert taken(bad, doubt=1.0) == 2 + len(SnapConfig().rounds) * a_round
+    assert taken(bad, doubt=0.0) == 2
 
 
 def test_paper_filter_improves_the_position(scene) -> None:

@@ -5,9 +5,12 @@ import json
 import pytest
 
 from registration_core import SnapConfig
+from registration_core.snap_config import RoundConfig
+
+ONE_ROUND = SnapConfig(rounds=(RoundConfig(1.0, 2.0, 0.5),))
 
 
-@pytest.mark.parametrize("config", [SnapConfig(), SnapConfig.paper(), SnapConfig(rounds=(1.0,))])
+@pytest.mark.parametrize("config", [SnapConfig(), SnapConfig.paper(), ONE_ROUND])
 def test_survives_json(config) -> None:
     assert SnapConfig.from_dict(json.loads(json.dumps(config.to_dict()))) == config
 
@@ -43,8 +46,9 @@ def test_stages_may_be_fewer() -> None:
         ({"proposals": {"count": 0}}, "config.proposals.count"),
         ({"proposals": {"count": 10**9}}, "config.proposals.count"),
         ({"selection": {"ring": [1.0]}}, "config.selection.ring"),
-        ({"rounds": [0.1] * 17}, "config.rounds"),
-        ({"rounds": [-0.1]}, r"config.rounds\[0\]"),
+        ({"rounds": [{"share": 0.1}] * 17}, "config.rounds"),
+        ({"rounds": [{"share": -0.1}]}, r"config.rounds\[0\].share"),
+        ({"rounds": [0.5]}, r"config.rounds\[0\] must be an object"),
         ({"confidence": {"mode_radius": 0}}, "config.confidence.mode_radius"),
         ({"confidence": {"temperature": 0.0}}, "config.confidence.temperature"),
         ({"confidence": {"intercept": -1e9}}, "config.confidence.intercept"),
