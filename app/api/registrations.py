@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, Depends
@@ -22,6 +22,11 @@ router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
 SECONDS_BETWEEN_UPDATES = 0.05
 """A stream tells no more often than that, and always tells the last state."""
+
+Technique = Literal[
+    "nudge", "turn", "flip", "numbers", "rest", "place", "three points", "proposal", "mode", "copy"
+]
+"""Ways to put an object somewhere other than by the gizmo."""
 
 EXAMPLE_POSE = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]
 
@@ -68,6 +73,7 @@ class NewPose(BaseModel):
     """Where the object is to be."""
 
     T_world_object: Pose = Field(examples=[EXAMPLE_POSE])
+    technique: Technique | None = Field(None, description="How the pose was found, for the log.")
 
 
 class FrameChoice(BaseModel):
@@ -112,7 +118,8 @@ def get_registration(seat: SeatDep) -> RegistrationOut:
 @router.put("/{registration_id}/pose")
 def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Put the object at a pose."""
-    seat.session.set_pose(rigid_pose(body.T_world_object, "T_world_object"), identity.actor)
+    T_world_object = rigid_pose(body.T_world_object, "T_world_object")
+    seat.session.set_pose(T_world_object, identity.actor, body.technique)
     return registration_out(seat)
 
 

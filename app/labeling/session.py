@@ -176,8 +176,14 @@ class LabelingSession:
             finally:
                 self._changed()
 
-    def set_pose(self, T_world_object: Array, actor: Actor) -> None:
-        """Put the object at a pose."""
+    def set_pose(self, T_world_object: Array, actor: Actor, technique: str | None = None) -> None:
+        """Put the object at a pose.
+
+        Args:
+            T_world_object: Where it goes.
+            actor: Who moves it.
+            technique: How the pose was found, for the log.
+        """
         with self._lock:
             self._require_free_hands()
             before = self._history.current.T_world_object
@@ -187,6 +193,7 @@ class LabelingSession:
                 T_before=before.tolist(),
                 T_after=T_world_object.tolist(),
                 dof=degrees_of_freedom(before, T_world_object, self._pivot),
+                detail={} if technique is None else {"technique": technique},
             )
             self._push(event, Step(T_world_object))
             self._changed()

@@ -1,10 +1,16 @@
-/** The labelling page: joins the 3-D view, the panel, the keys and the server. */
+/**
+ * The labelling page: joins the 3-D view, the panel, the keys and the server.
+ *
+ * What else there is on the page are parts: makers that take the `page` below and return any of
+ * `bindings` (keys), `open(task, scene, object)`, called once, and `draw(registration, before)`, called
+ * for every new state.
+ */
 
-import { del, get, post, put } from "../api.js";
+import { del, get, post } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { messageArea } from "../message.js";
 import { setUpHelp } from "./help.js";
-import { setUpImage } from "./image.js";
+import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { showNext } from "./next.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
@@ -18,7 +24,14 @@ let task = null;
 let registration = null;
 let snapRequest = null;
 let connected = true;
-let image = null;
+
+const page = {
+  message,
+  path,
+  registration: () => registration,
+  isConnected: () => connected,
+};
+const PARTS = [imagePart(page)];
 
 const ACTIONS = {
   snap: requestSnap,
@@ -38,8 +51,7 @@ const BINDINGS = [
   { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss") },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
   { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
-  { keys: [","], does: "Previous frame", run: () => stepFrame(-1) },
-  { keys: ["."], does: "Next frame", run: () => stepFrame(+1) },
+  ...PARTS.flatMap((part) => part.bindings ?? []),
   { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
   { keys: ["?"], does: "Show these keys", run: () => openHelp() },
 ];
@@ -49,8 +61,6 @@ const attachKeys = keyBindings(BINDINGS);
 attachKeys(window);
 releaseFocusAfterPointer(document);
 for (const id of Object.keys(ACTIONS)) byId(id).addEventListener("click", () => act(id));
-byId("frame-previous").addEventListener("click", () => stepFrame(-1));
-byId("frame-next").addEventListener("click", () => stepFrame(+1));
 byId("closed-retry").addEventListener("click", () => location.reload());
 
 try {
@@ -69,7 +79,7 @@ async function openTask() {
     get(`/api/scenes/${task.scene.id}`),
     get(`/api/objects/${task.object.id}`),
   ]);
-  image = setUpImage(scene, object.diameter);
+  for (const part of PARTS) part.open?.(task, scene, object);
   show(started);
   followRegistration(started.id, {
     resume: start,
@@ -107,7 +117,7 @@ function show(received) {
   const before = registration;
   registration = received;
   drawPanel(registration, connected);
-  image.draw(registration);
+  for (const part of PARTS) part.draw?.(registration, before);
   reportSnap(before?.snap, registration.snap);
   const { message: problem } = registration;
   if (problem && problem !== before?.message) message.show(problem, "problem");
@@ -149,12 +159,6 @@ async function requestSnap() {
     show({ ...registration, snap: before });
     throw error;
   }
-}
-
-async function stepFrame(by) {
-  const frameId = image?.step(by) ?? null;
-  if (frameId === null || !connected) return;
-  await put(path("frame"), { frame_id: frameId }).catch(message.problem);
 }
 
 function submitOrGoOn() {
