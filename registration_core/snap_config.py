@@ -218,7 +218,12 @@ class RoundConfig:
     """The round is left out where the confidence so far is higher than this."""
 
 
-DEFAULT_ROUNDS = (RoundConfig(0.3, 1.0, 1.0), RoundConfig(0.5, 1.4, 0.95), RoundConfig(0.6, 1.6, 0.6))
+DEFAULT_ROUNDS = (
+    RoundConfig(0.3, 1.0, 1.0),
+    RoundConfig(0.5, 1.4, 0.95),
+    RoundConfig(0.6, 1.6, 0.6),
+    RoundConfig(1.0, 1.6, 0.2),
+)
 
 
 @dataclass(frozen=True)
