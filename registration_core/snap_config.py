@@ -120,9 +120,13 @@ class SelectionConfig:
     """The polished start replaces the start, and another mode replaces that, only if it scores better by this
     much, ..."""
     lead_over_fit: float = 4.0
-    """... or by this much where the start itself fits ..."""
+    """... or by this much where the start itself fits, ..."""
     fit_match: float = 0.7
-    """... so that more of the claimed surface than this is matched."""
+    """... which it does where more of the claimed surface than this is matched, ..."""
+    aside_translation: float = 0.004
+    """... and the pose is farther from it than this, metres, ..."""
+    aside_rotation: float = 0.07
+    """... or this, radians."""
     min_match: float = 0.04
     """With less of the claimed surface matched than this, the start is kept."""
     settled_match: float = 0.9
