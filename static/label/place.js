@@ -3,6 +3,8 @@
 import { post } from "../api.js";
 import { byId } from "../dom.js";
 
+/** Pixels; a pointer that moved farther has dragged the image. */
+const LARGEST_CLICK = 4;
 const CROSSHAIR = ".placing canvas { cursor: crosshair !important }";
 
 /** A part of the labelling page. */
@@ -11,13 +13,20 @@ export function placePart(page) {
   const image = byId("color");
   let roots = [document.documentElement];
   let on = false;
+  let pressedAt = null;
 
   button.addEventListener("click", () => use(!on));
   byId("place-leave").addEventListener("click", leave);
-  image.closest(".image-frame").addEventListener("click", (event) => {
+  const frame = image.closest(".image-frame");
+  frame.addEventListener("pointerdown", (event) => (pressedAt = event));
+  frame.addEventListener("click", (event) => {
+    if (!on || isDrag(event) || event.target.closest("button")) return;
     const pixel = pixelAt(event);
-    if (on && pixel) place(pixel);
+    if (pixel) place(pixel);
   });
+
+  const isDrag = ({ clientX, clientY }) =>
+    Math.hypot(clientX - pressedAt.clientX, clientY - pressedAt.clientY) > LARGEST_CLICK;
 
   function use(wanted) {
     on = wanted && page.canMove();

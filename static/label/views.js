@@ -22,13 +22,13 @@ export function viewsPart(page) {
   }
 
   const bindings = [
+    { keys: ["4"], does: "Look at the object, closer", run: () => look("object") },
     { keys: ["5"], does: "Look as the sensor did", run: () => look("sensor") },
     { keys: ["6"], does: "Look from the top", run: () => look("top") },
     { keys: ["7"], does: "Look from the front", run: () => look("front") },
     { keys: ["8"], does: "Look from the side", run: () => look("side") },
     { keys: ["9"], does: "Go around the object, to the left", run: () => look("left"), repeats: true },
     { keys: ["0"], does: "Go around the object, to the right", run: () => look("right"), repeats: true },
-    { keys: ["Z"], does: "Zoom to the object", run: () => look("object") },
   ];
   return { bindings, draw };
 }

@@ -216,7 +216,7 @@ def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None
     T = desk.pose
     seen = {}
     before = desk.camera
-    for key, name in (("6", "top"), ("7", "front"), ("8", "side"), ("9", "left"), ("z", "zoom")):
+    for key, name in (("6", "top"), ("7", "front"), ("8", "side"), ("9", "left"), ("4", "object")):
         page.keyboard.press(key)
         seen[name] = before = desk.wait_for_camera(before)
         take_picture(page, f"label-view-{name}")
