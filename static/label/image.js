@@ -90,7 +90,7 @@ export function imagePart(page) {
   function drawOutline() {
     waiting = 0;
     if (!drawMesh || !T || canvas.hidden) return;
-    const unit = devicePixelRatio;
+    const unit = Math.min(devicePixelRatio, 2);
     resize(canvas, Math.round(box.clientWidth * unit), Math.round(box.clientHeight * unit));
     const { scale, left, top } = view;
     const camera = shownCamera(shown.intrinsics, { scale: scale * unit, left: left * unit, top: top * unit });

@@ -3,6 +3,7 @@
 const NEAR = 0.01; // metres
 const FAR = 100;
 const SAMPLES = 4;
+const BLOCK = 16; // pixels: sizes are multiples, so that the levels of a mipmap average whole blocks
 
 const SHAPE_VERTEX = `#version 300 es
 uniform mat4 cameraFromObject;
@@ -33,7 +34,8 @@ void main() {
 }`;
 
 // The line lies inside the edge of the shape, so that the edge itself is where colour meets dark: a dark rim on
-// either side lets it be read on any ground. Shrinking and growing the shape is a minimum and a maximum over discs.
+// either side lets it be read on any ground. Shrinking and growing the shape is a minimum and a maximum over
+// discs. Far from the edge nothing needs to be looked for: there the blocks of pixels around are all of one kind.
 const OUTLINE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform sampler2D shape;
@@ -43,24 +45,31 @@ uniform float blend;
 uniform float unit;
 out vec4 painted;
 const float LINE = 2.0, RIM = 1.25;
+float cover(int x, int y, int level) {
+  ivec2 there = clamp(ivec2(gl_FragCoord.xy) + ivec2(x, y), ivec2(0), size - 1);
+  return texelFetch(shape, there >> level, level).a;
+}
 void main() {
-  ivec2 here = ivec2(gl_FragCoord.xy);
-  vec4 seen = texelFetch(shape, here, 0);
-  float covered = seen.a, grown = seen.a, withoutLine = seen.a, withoutRim = seen.a;
+  vec4 seen = texelFetch(shape, ivec2(gl_FragCoord.xy), 0);
+  painted = blend * vec4(color * seen.r, seen.a);
   int reach = int(ceil((LINE + RIM) * unit));
+  int level = reach > 4 ? 4 : 3;
+  float around = cover(-reach, -reach, level) + cover(reach, -reach, level) + cover(-reach, reach, level)
+    + cover(reach, reach, level);
+  if (around == 0.0 || around == 4.0) return;
+  float grown = seen.a, withoutLine = seen.a, withoutRim = seen.a;
   for (int y = -reach; y <= reach; y++) {
     for (int x = -reach; x <= reach; x++) {
-      float near = texelFetch(shape, clamp(here + ivec2(x, y), ivec2(0), size - 1), 0).a;
+      float near = cover(x, y, 0);
       float away = length(vec2(x, y)) - 0.5;
       grown = max(grown, near * clamp(RIM * unit - away, 0.0, 1.0));
       withoutLine = min(withoutLine, mix(1.0, near, clamp(LINE * unit - away, 0.0, 1.0)));
       withoutRim = min(withoutRim, mix(1.0, near, clamp((LINE + RIM) * unit - away, 0.0, 1.0)));
     }
   }
-  vec4 filled = blend * vec4(color * seen.r, covered);
-  float rim = 0.75 * (grown - covered) + 0.4 * (withoutLine - withoutRim);
-  float line = covered - withoutLine;
-  painted = filled * (1.0 - rim) + vec4(0.0, 0.0, 0.0, rim);
+  float rim = 0.75 * (grown - seen.a) + 0.4 * (withoutLine - withoutRim);
+  float line = seen.a - withoutLine;
+  painted = painted * (1.0 - rim) + vec4(0.0, 0.0, 0.0, rim);
   painted = painted * (1.0 - line) + vec4(color * line, line);
 }`;
 
@@ -103,7 +112,7 @@ export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
  *
  * The function returned paints over a canvas {camera, T, color, blend, unit}: the pinhole camera in pixels of
  * the canvas, T_camera_object in metres, the colour as [red, green, blue] from 0 to 1, `blend` from 0 (the
- * outline alone) to 1 (the shape hides what is below), and the pixels of the canvas in one of the page. All
+ * outline alone) to 1 (the shape hides what is below), and the pixels of the canvas in one of the page, up to 2. All
  * canvases share one hidden WebGL canvas, since a browser allows only a few.
  */
 export function meshDrawing({ vertices, faces }) {
@@ -120,8 +129,8 @@ export function meshDrawing({ vertices, faces }) {
 
   function makeRoom(width, height) {
     if (buffers && hidden.width >= width && hidden.height >= height) return;
-    hidden.width = Math.max(hidden.width, width);
-    hidden.height = Math.max(hidden.height, height);
+    hidden.width = Math.max(hidden.width, BLOCK * Math.ceil(width / BLOCK));
+    hidden.height = Math.max(hidden.height, BLOCK * Math.ceil(height / BLOCK));
     if (buffers) freeBuffers(gl, buffers);
     buffers = makeBuffers(gl, hidden.width, hidden.height);
   }
@@ -139,7 +148,9 @@ export function meshDrawing({ vertices, faces }) {
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, buffers.sampled);
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, buffers.resolved);
-    gl.blitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    const all = [0, 0, hidden.width, hidden.height];
+    gl.blitFramebuffer(...all, ...all, gl.COLOR_BUFFER_BIT, gl.NEAREST);
+    gl.generateMipmap(gl.TEXTURE_2D);
   }
 
   function drawOutline({ color, blend, unit }, width, height) {
@@ -229,8 +240,8 @@ function makeBuffers(gl, width, height) {
 
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA8, width, height);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texStorage2D(gl.TEXTURE_2D, 1 + Math.log2(BLOCK), gl.RGBA8, width, height);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST_MIPMAP_NEAREST);
   const resolved = gl.createFramebuffer();
   gl.bindFramebuffer(gl.FRAMEBUFFER, resolved);
   gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
