@@ -1,7 +1,8 @@
-/** The colour image of the frame, with the outline of the object or its shape on top; zoom; choice of frame. */
+/** The colour image of the frame, with the outline of the object or its shape on top; zoom; the other frames. */
 
 import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
+import { frameStrip } from "./frames.js";
 import { extentInPicture, loadMesh, meshDrawing, shownCamera } from "./outline.js";
 import { zoomable } from "./zoom.js";
 
@@ -14,30 +15,26 @@ export function imagePart(page) {
   const canvas = byId("outline");
   const blend = byId("blend");
   const zoom = zoomable(box, showView);
+  const strip = frameStrip(chooseFrame);
   let frames = [];
   let shown = null; // the frame
   let view = null;
   let mesh = null;
   let drawMesh = null;
-  let T = null;
+  let registration = null;
   let waiting = 0;
 
   image.addEventListener("load", () => (image.hidden = false));
   image.addEventListener("error", () => (image.hidden = true));
   blend.addEventListener("input", drawSoon);
-  byId("frame-previous").addEventListener("click", () => step(-1));
-  byId("frame-next").addEventListener("click", () => step(+1));
   byId("zoom-in").addEventListener("click", zoom.zoomIn);
   byId("zoom-out").addEventListener("click", zoom.zoomOut);
   byId("zoom-fit").addEventListener("click", fitOrWhole);
   byId("hide-outline").addEventListener("click", hideOrShow);
 
-  const indexOf = (frame) => frames.indexOf(frame);
-  const beside = (by) => frames[indexOf(shown) + by] ?? null;
-
   function open(_task, scene, object) {
     frames = scene.frames;
-    byId("frames").hidden = frames.length < 2;
+    strip.open(frames);
     showMesh(object).catch(page.message.problem);
   }
 
@@ -45,22 +42,21 @@ export function imagePart(page) {
     mesh = await loadMesh(object.outline_mesh_url);
     drawMesh = meshDrawing(mesh);
     byId("no-outline").hidden = drawMesh !== null;
-    drawSoon();
+    drawPose();
   }
 
-  async function step(by) {
-    const frame = beside(by);
-    if (!frame || !page.isConnected()) return;
+  async function chooseFrame(frame) {
+    if (frame === shown || !page.isConnected()) return;
     await put(page.path("frame"), { frame_id: frame.id }).catch(page.message.problem);
   }
 
-  function draw({ frame_id: frameId, T_camera_object, confidence }) {
-    const frame = frames.find(({ id }) => id === frameId);
+  function draw(newest) {
+    const frame = frames.find(({ id }) => id === newest.frame_id);
     if (!frame) return;
+    registration = newest;
     if (shown !== frame) showFrame(frame);
-    T = T_camera_object;
-    canvas.dataset.source = confidence === null ? "human" : "machine";
-    drawSoon();
+    canvas.dataset.source = newest.confidence === null ? "human" : "machine";
+    drawPose();
   }
 
   function showFrame(frame) {
@@ -68,10 +64,7 @@ export function imagePart(page) {
     if (frame.color_url) image.src = frame.color_url;
     else image.hidden = true;
     zoom.setSize(frame.width, frame.height);
-    const place = frames.length > 1 ? ` (${indexOf(frame) + 1} of ${frames.length})` : "";
-    setText(byId("frame-name"), `Frame ${frame.image_id}${place}`);
-    byId("frame-previous").disabled = beside(-1) === null;
-    byId("frame-next").disabled = beside(+1) === null;
+    strip.mark(frame);
   }
 
   function showView(newView) {
@@ -89,7 +82,8 @@ export function imagePart(page) {
 
   function drawOutline() {
     waiting = 0;
-    if (!drawMesh || !T || canvas.hidden) return;
+    if (!drawMesh || !registration || canvas.hidden) return;
+    const { T_camera_object: T } = registration;
     const unit = Math.min(devicePixelRatio, 2);
     resize(canvas, Math.round(box.clientWidth * unit), Math.round(box.clientHeight * unit));
     const { scale, left, top } = view;
@@ -97,10 +91,18 @@ export function imagePart(page) {
     drawMesh(canvas, { camera, T, color: colorOf(canvas), blend: blend.valueAsNumber, unit });
   }
 
+  /** Draws the object where it is now, here and in the thumbnails. */
+  function drawPose() {
+    drawSoon();
+    if (drawMesh && registration) {
+      strip.draw({ drawMesh, T_world_object: registration.T_world_object, color: colorOf(canvas) });
+    }
+  }
+
   function fitOrWhole() {
     if (!zoom.isWhole()) zoom.whole();
-    else if (mesh && T) {
-      const extent = extentInPicture(mesh, T, shown.intrinsics);
+    else if (mesh && registration) {
+      const extent = extentInPicture(mesh, registration.T_camera_object, shown.intrinsics);
       if (extent) zoom.fit(extent);
       else page.message.show("The object is behind the camera of this frame.");
     }
@@ -108,13 +110,14 @@ export function imagePart(page) {
 
   function hideOrShow() {
     canvas.hidden = !canvas.hidden;
+    byId("frame-list").classList.toggle("bare", canvas.hidden);
     setText(byId("hide-outline-text"), canvas.hidden ? "Show outline" : "Hide outline");
     drawSoon();
   }
 
   const bindings = [
-    { keys: [","], does: "Previous frame", run: () => step(-1) },
-    { keys: ["."], does: "Next frame", run: () => step(+1) },
+    { keys: [","], does: "Previous frame", run: () => strip.step(-1) },
+    { keys: ["."], does: "Next frame", run: () => strip.step(+1) },
     { keys: ["Z"], does: "Zoom the image to the object, and back to all of it", run: fitOrWhole },
     { keys: ["O"], does: "Hide the outline on the image, and show it again", run: hideOrShow },
   ];

@@ -21,7 +21,7 @@ from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-PIXELS = "() => document.getElementById('outline').toDataURL()"
+PIXELS = "selector => Array.from(document.querySelectorAll(selector), canvas => canvas.toDataURL())"
 VIEW = """() => {
   const { a, e, f } = new DOMMatrix(getComputedStyle(document.getElementById("color")).transform);
   return [a, e, f];
@@ -77,8 +77,13 @@ class Image:
     @property
     def pixels(self) -> NDArray[np.uint8]:
         """What is drawn over the image (H, W, 4)."""
-        png = base64.b64decode(self.page.evaluate(PIXELS).partition(",")[2])
-        return np.array(PIL.Image.open(io.BytesIO(png)).convert("RGBA"))
+        (drawn,) = self.drawn_on("#outline")
+        return drawn
+
+    def drawn_on(self, selector: str) -> list[NDArray[np.uint8]]:
+        """What is on the canvases (H, W, 4)."""
+        pictures = [base64.b64decode(url.partition(",")[2]) for url in self.page.evaluate(PIXELS, selector)]
+        return [np.array(PIL.Image.open(io.BytesIO(png)).convert("RGBA")) for png in pictures]
 
     @property
     def place(self) -> NDArray[np.float64]:
@@ -247,6 +252,43 @@ def test_the_machine_and_the_human_have_their_colours(image: Image) -> None:
     take_picture(image.page, "label-outline-snapped")
 
 
+def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image) -> None:
+    page, desk = image.page, image.desk
+    T_world_object = np.array(desk.state["T_world_object"])
+
+    def are_drawn() -> bool:
+        thumbnails = image.drawn_on("#frame-list canvas")
+        assert len(thumbnails) == len(image.frames) == 3
+        for frame, seen in zip(image.frames, thumbnails, strict=True):
+            height, width, _ = seen.shape
+            if width < 50:
+                return False
+            camera = View(width / frame["width"], 0.0, 0.0).camera(frame, width, height)
+            T_camera_object = pose.inverse(np.array(frame["T_world_camera"])) @ T_world_object
+            expected = np.argwhere(render_depth(image.model, camera, T_camera_object) > 0)
+            assert len(expected) > 20
+            drawn = np.argwhere(seen[..., 3] > 128)
+            if len(drawn) < 10 or np.linalg.norm(drawn.mean(axis=0) - expected.mean(axis=0)) > 2:
+                return False
+        return True
+
+    wait_until(are_drawn, "the outline in every thumbnail", 20)
+    first, _, third = image.frames
+    current = page.locator("#frame-list [aria-current]")
+    page.get_by_role("button", name=f"Show frame {third['image_id']}").click()
+    wait_until(lambda: desk.state["frame_id"] == third["id"], "the frame that was clicked")
+    expect(current).to_have_accessible_name(f"Show frame {third['image_id']}")
+    expect(page.locator("#frame-place")).to_have_text("3 of 3")
+    expect(page.locator("#frame-next")).to_be_disabled()
+    take_picture(page, "label-frames")
+    page.keyboard.press(",")
+    expect(page.locator("#frame-place")).to_have_text("2 of 3")
+    page.get_by_role("button", name="Previous frame").click()
+    expect(page.locator("#frame-place")).to_have_text("1 of 3")
+    assert desk.state["frame_id"] == first["id"]
+    assert len(desk.events("frame", 3)) == 3
+
+
 def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 1366, "height": 768}, color_scheme="dark")
     context.add_init_script(NO_WEBGL)
@@ -254,7 +296,8 @@ def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser
         page = context.new_page()
         page.goto(server.new_link("without webgl"))
         Desk(page, server, "mug")
-        expect(page.locator("#no-outline")).to_contain_text("no WebGL")
+        expect(page.locator("#no-outline")).to_have_text("Without WebGL 2 no outline can be drawn.")
+        expect(page.locator("#blend")).to_be_hidden()
         expect(page.locator("#color")).to_be_visible()
         take_picture(page, "label-without-webgl")
     finally:
