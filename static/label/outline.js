@@ -44,7 +44,7 @@ uniform vec3 color;
 uniform float blend;
 uniform float unit;
 out vec4 painted;
-const float LINE = 2.0, RIM = 1.25;
+const float LINE = 2.5, RIM = 1.5;
 float cover(int x, int y, int level) {
   ivec2 there = clamp(ivec2(gl_FragCoord.xy) + ivec2(x, y), ivec2(0), size - 1);
   return texelFetch(shape, there >> level, level).a;
