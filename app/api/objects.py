@@ -18,6 +18,8 @@ from app.api.dependencies import (
     page_of,
     row_or_404,
 )
+from app.api.scenes import FOREVER
+from app.outline_mesh import outline_mesh
 from app.services import Services
 from app.tables import Object
 from registration_core.object_model import read_mesh
@@ -35,6 +37,7 @@ class ObjectOut(BaseModel):
     diameter: float
     symmetries: dict[str, Any]
     mesh_url: str
+    outline_mesh_url: str
 
 
 @router.get("")
@@ -70,6 +73,13 @@ def get_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Re
     return Response(content, media_type="application/octet-stream")
 
 
+@router.get("/{object_id}/outline.mesh", response_class=Response)
+def get_outline_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+    """The mesh thinned for drawing outlines: uint32 V and F, float32 (V, 3) in metres, uint32 (F, 3)."""
+    content = outline_mesh(services.data.model(_object(services, object_id)))
+    return Response(content, media_type="application/octet-stream", headers=FOREVER)
+
+
 def _object(services: Services, object_id: int) -> Object:
     with services.database.read() as session:
         return row_or_404(session, Object, object_id)
@@ -84,4 +94,5 @@ def _out(row: Object) -> ObjectOut:
         diameter=row.diameter,
         symmetries=row.symmetries,
         mesh_url=f"/api/objects/{row.id}/mesh.ply",
+        outline_mesh_url=f"/api/objects/{row.id}/outline.mesh?content={row.mesh_hash[:16]}",
     )

@@ -44,7 +44,7 @@ function keyName({ key, code, altKey }) {
 function belongsToControl(event) {
   const target = event.composedPath()[0];
   if (!target?.closest) return false;
-  if (target.closest("input, textarea, select, [contenteditable]")) return true;
+  if (target.closest("input:not([type='range']), textarea, select, [contenteditable]")) return true;
   return (event.key === " " || event.key === "Enter") && target.closest("button, a, summary") !== null;
 }
 

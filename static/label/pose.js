@@ -18,6 +18,14 @@ export function rotationVector(T) {
   return axis.map((component) => (component / sine) * angle);
 }
 
+/** The pose in a frame of axes, from both in the world: inverse(T_world_frame) @ T_world_object. */
+export function relativeTo(T_world_frame, T_world_object) {
+  const [a, b] = [T_world_frame, T_world_object];
+  const from = [0, 1, 2].map((row) => b[row].map((value, column) => (column === 3 ? value - a[row][3] : value)));
+  const turned = (row, column) => [0, 1, 2].reduce((sum, k) => sum + a[k][row] * from[k][column], 0);
+  return [...[0, 1, 2].map((row) => [0, 1, 2, 3].map((column) => turned(row, column))), [0, 0, 0, 1]];
+}
+
 /** Unit quaternion [w, x, y, z], w >= 0, from the largest of its four components. */
 function quaternion([[a, b, c], [d, e, f], [g, h, i]]) {
   const candidates = [

@@ -36,6 +36,22 @@ def test_a_mesh_is_the_bytes_that_were_imported(
         assert answer.content == (demo / f"models/obj_{item['obj_id']:06d}.ply").read_bytes()
 
 
+def test_the_mesh_for_outlines_is_in_metres_and_kept_by_the_browser(
+    objects: list[dict], operator: httpx.Client, demo: Path
+) -> None:
+    for item in objects:
+        answer = operator.get(item["outline_mesh_url"])
+        assert answer.headers["content-type"] == "application/octet-stream"
+        assert "immutable" in answer.headers["cache-control"]
+        vertex_count, face_count = np.frombuffer(answer.content, "<u4", 2)
+        vertices = np.frombuffer(answer.content, "<f4", 3 * vertex_count, 8).reshape(-1, 3)
+        model = ObjectModel.load(demo / f"models/obj_{item['obj_id']:06d}.ply", unit="mm")
+        assert np.allclose(vertices.min(axis=0), model.vertices.min(axis=0))
+        assert np.allclose(vertices.max(axis=0), model.vertices.max(axis=0))
+        assert face_count == len(model.faces)
+    assert len({item["outline_mesh_url"].partition("content=")[2] for item in objects}) == len(objects)
+
+
 def test_symmetries_are_in_metres(server: LiveServer, operator: httpx.Client, demo_copy: Path) -> None:
     half_turn = np.diag([-1.0, -1.0, 1.0, 1.0])
     half_turn[0, 3] = 12.0  # millimetres in BOP
@@ -61,6 +77,6 @@ def test_lists_come_in_pages(operator: httpx.Client, objects: list[dict]) -> Non
     assert second["next"] is None
 
 
-@pytest.mark.parametrize("url", ["objects/999", "objects/999/mesh.ply"])
+@pytest.mark.parametrize("url", ["objects/999", "objects/999/mesh.ply", "objects/999/outline.mesh"])
 def test_what_does_not_exist_is_said(operator: httpx.Client, url: str) -> None:
     assert "no object 999" in sentence(operator.get(f"/api/{url}"), 404)

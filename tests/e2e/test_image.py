@@ -1,0 +1,304 @@
+"""The colour image of the labelling page: the outline on it, zoom, blend, and a browser without WebGL."""
+
+import base64
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import PIL.Image
+import pytest
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, expect
+
+from registration_core import Intrinsics, ObjectModel, pose
+from registration_core.rasterizer import render_depth
+from tests.app.waiting import wait_until
+from tests.e2e.conftest import take_picture
+from tests.e2e.gizmo import Handle, pixel
+from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+PIXELS = "selector => Array.from(document.querySelectorAll(selector), canvas => canvas.toDataURL())"
+VIEW = """() => {
+  const { a, e, f } = new DOMMatrix(getComputedStyle(document.getElementById("color")).transform);
+  return [a, e, f];
+}"""
+NO_WEBGL = """if (window === top) {
+  const original = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+    return kind === "webgl2" ? null : original.call(this, kind, ...rest);
+  };
+}"""
+HELD_IN_VIEW = pose.exp([0.01, 0.02, 0.6, 0.5, -0.7, 0.9])
+"""T_camera_object of an object before the camera, seen askew."""
+COVERED = 192
+"""Alpha from which on a pixel is the object's, not the rim beside it."""
+
+
+@dataclass(frozen=True)
+class View:
+    """How the image is shown: pixels of the page to one of its own, and where its corner lies in its box."""
+
+    scale: float
+    left: float
+    top: float
+
+    def camera(self, frame: dict, width: int, height: int) -> Intrinsics:
+        """The frame's camera as it belongs to what is shown."""
+        k = frame["intrinsics"]
+        return Intrinsics(
+            width,
+            height,
+            self.scale * k["fx"],
+            self.scale * k["fy"],
+            self.scale * (k["cx"] + 0.5) + self.left - 0.5,
+            self.scale * (k["cy"] + 0.5) + self.top - 0.5,
+        )
+
+
+class Image:
+    """The image in the panel of a labelling page."""
+
+    def __init__(self, desk: Desk) -> None:
+        self.desk = desk
+        self.page = desk.page
+        get = lambda path: self.page.request.get(f"{desk.root}{path}")  # noqa: E731
+        self.frames = get(f"/api/scenes/{desk.task['scene']['id']}").json()["frames"]
+        mesh = get(f"/api/objects/{desk.task['object']['id']}/mesh.ply").body()
+        self.model = ObjectModel.from_bytes(mesh, "ply", "mm")
+
+    @property
+    def view(self) -> View:
+        return View(*self.page.evaluate(VIEW))
+
+    @property
+    def pixels(self) -> NDArray[np.uint8]:
+        """What is drawn over the image (H, W, 4)."""
+        (drawn,) = self.drawn_on("#outline")
+        return drawn
+
+    def drawn_on(self, selector: str) -> list[NDArray[np.uint8]]:
+        """What is on the canvases (H, W, 4)."""
+        pictures = [base64.b64decode(url.partition(",")[2]) for url in self.page.evaluate(PIXELS, selector)]
+        return [np.array(PIL.Image.open(io.BytesIO(png)).convert("RGBA")) for png in pictures]
+
+    @property
+    def place(self) -> NDArray[np.float64]:
+        """The middle (2,) of what is drawn, pixels; NaN where nothing is."""
+        rows, columns = np.nonzero(self.pixels[..., 3] > COVERED)
+        return np.array([columns.mean(), rows.mean()]) if len(rows) else np.full(2, np.nan)
+
+    def blend(self, share: float) -> None:
+        self.page.locator("#blend").fill(str(share))
+
+    def put(self, T_camera_object: NDArray[np.float64]) -> None:
+        """Put the object somewhere in the first frame."""
+        T_world_object = np.array(self.frames[0]["T_world_camera"]) @ T_camera_object
+        body = {"T_world_object": T_world_object.tolist()}
+        assert self.page.request.put(f"{self.desk.url}/pose", data=body).ok
+
+    def silhouette(self, T_camera_object: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Where the object is in the first frame as it is shown, by the library."""
+        height, width, _ = self.pixels.shape
+        return render_depth(self.model, self.view.camera(self.frames[0], width, height), T_camera_object) > 0
+
+    def overlap(self, expected: NDArray[np.bool_]) -> float:
+        """Intersection over union of what is drawn and what should be."""
+        drawn = self.pixels[..., 3] > COVERED
+        return float((drawn & expected).sum() / (drawn | expected).sum())
+
+
+@pytest.fixture(scope="module")
+def mug(server: Server, browser: Browser) -> Iterator[Image]:
+    """The page of an operator before the mug of the first demo scene."""
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
+    problems: list[str] = []
+    page = context.new_page()
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.goto(server.new_link("operator of images"))
+    yield Image(Desk(page, server, "mug"))
+    context.close()
+    assert problems == []
+
+
+@pytest.fixture
+def image(mug: Image) -> Image:
+    """The same page with the object before the camera, all of the image, and the outline alone."""
+    mug.put(HELD_IN_VIEW)
+    mug.blend(0.0)
+    if (whole := mug.page.get_by_role("button", name="Whole")).is_visible():
+        whole.click()
+    if (show := mug.page.get_by_role("button", name="Show outline")).is_visible():
+        show.click()
+    expected = mug.silhouette(HELD_IN_VIEW).nonzero()
+    middle = np.mean(expected, axis=1)[::-1]
+    wait_until(lambda: np.linalg.norm(mug.place - middle) < 5, "the outline")
+    return mug
+
+
+def test_what_is_drawn_is_what_the_library_renders(image: Image) -> None:
+    image.blend(1.0)
+    expected = image.silhouette(HELD_IN_VIEW)
+    assert expected.sum() > 500
+    wait_until(lambda: image.overlap(expected) > 0.97, "the object where the library renders it", 20)
+    image.page.keyboard.press("z")
+    wait_until(lambda: image.view.scale > 1, "the image zoomed in")
+    expected = image.silhouette(HELD_IN_VIEW)
+    assert expected.sum() > 5000
+    wait_until(lambda: image.overlap(expected) > 0.99, "the same, zoomed in", 20)
+    rows, columns = np.nonzero(expected)
+    assert np.allclose(image.place, [columns.mean(), rows.mean()], atol=0.25)
+
+
+def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
+    desk, page = image.desk, image.page
+    assert page.request.post(f"{desk.url}/reset").ok
+    desk.frame.evaluate(NEXT_PICTURE)
+    expected = image.silhouette(np.array(desk.state["T_camera_object"])).nonzero()
+    wait_until(lambda: np.linalg.norm(image.place - np.mean(expected, axis=1)[::-1]) < 5, "the start pose")
+    before = image.place
+    handle = Handle("tz", desk.scale)
+    start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
+    page.mouse.move(*(start - 2))
+    page.mouse.move(*start)
+    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    page.mouse.down()
+    for share in (0.3, 0.6, 1.0):
+        page.mouse.move(*(start + share * (end - start)))
+    wait_until(lambda: np.linalg.norm(image.place - before) > 10, "the outline on its way")
+    assert desk.state["dragging"]
+    take_picture(page, "label-outline-in-a-drag")
+    page.mouse.up()
+    desk.events("drag")
+    image.blend(1.0)
+    expected = image.silhouette(np.array(desk.state["T_camera_object"]))
+    wait_until(lambda: image.overlap(expected) > 0.95, "the outline where the drag ended", 20)
+
+
+def test_blend_goes_from_the_outline_alone_to_the_shape(image: Image) -> None:
+    image.page.keyboard.press("z")
+    wait_until(lambda: image.view.scale > 1, "the image zoomed in")
+    wide = image.silhouette(HELD_IN_VIEW)
+    rows, columns = np.nonzero(wide)
+    inside = (int(rows.mean()) + 30, int(columns.mean()))
+    assert wide[inside]
+    seen = []
+    for share in (0.0, 0.5, 1.0):
+        image.blend(share)
+        wanted = round(255 * share)
+        wait_until(lambda wanted=wanted: abs(int(image.pixels[inside][3]) - wanted) <= 2, f"blend {share}")
+        seen.append((image.pixels[..., 3] > COVERED).sum())
+        take_picture(image.page, f"label-outline-blend-{share}")
+    assert 100 < seen[0] < 0.2 * wide.sum() < seen[2]
+
+
+def test_a_key_hides_the_outline_wherever_the_focus_is(image: Image) -> None:
+    page = image.page
+    outline = page.locator("#outline")
+    page.locator("#blend").focus()
+    page.keyboard.press("h")
+    expect(outline).to_be_hidden()
+    expect(page.get_by_role("button", name="Show outline")).to_be_visible()
+    page.locator("#view").focus()
+    page.keyboard.press("h")
+    expect(outline).to_be_visible()
+    page.get_by_role("button", name="Hide outline").click()
+    expect(outline).to_be_hidden()
+
+
+def test_zoom_by_wheel_buttons_and_keys(image: Image) -> None:
+    page = image.page
+    whole = image.view
+    box = page.locator("#image").bounding_box()
+    assert box is not None
+    x, y = round(0.7 * box["width"]), round(0.4 * box["height"])
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.wheel(0, -300)
+    wait_until(lambda: image.view.scale > 2 * whole.scale, "the image zoomed in")
+    near = image.view
+    assert (x - near.left) / near.scale == pytest.approx((x - whole.left) / whole.scale, abs=0.5)
+    assert (y - near.top) / near.scale == pytest.approx((y - whole.top) / whole.scale, abs=0.5)
+    before = image.place
+    page.mouse.down()
+    page.mouse.move(box["x"] + x - 30, box["y"] + y + 20, steps=3)
+    page.mouse.up()
+    panned = image.view
+    assert (panned.left - near.left, panned.top - near.top) == pytest.approx((-30, 20), abs=1)
+    wait_until(lambda: np.abs(image.place - before).max() > 5, "the outline with the image")
+    page.get_by_role("button", name="Zoom out").click()
+    assert image.view.scale == pytest.approx(panned.scale / 1.5, rel=1e-4)
+    page.locator("#image").focus()
+    page.keyboard.press("+")
+    page.keyboard.press("ArrowRight")
+    assert image.view.scale == pytest.approx(panned.scale, rel=1e-4)
+    page.get_by_role("button", name="Whole").click()
+    assert image.view == whole
+
+
+def test_the_machine_and_the_human_have_their_colours(image: Image) -> None:
+    def is_warm() -> bool:
+        pixels = image.pixels
+        line = pixels[pixels[..., 3] > 250].astype(int)
+        return bool(np.median(line[:, 0] - line[:, 2]) > 0)
+
+    assert is_warm()
+    image.page.keyboard.press("Space")
+    image.desk.events("snap_applied")
+    wait_until(lambda: not is_warm(), "the outline in the colour of the machine")
+    image.page.keyboard.press("z")
+    take_picture(image.page, "label-outline-snapped")
+
+
+def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image) -> None:
+    page, desk = image.page, image.desk
+    T_world_object = np.array(desk.state["T_world_object"])
+
+    def are_drawn() -> bool:
+        thumbnails = image.drawn_on("#frame-list canvas")
+        assert len(thumbnails) == len(image.frames) == 3
+        for frame, seen in zip(image.frames, thumbnails, strict=True):
+            height, width, _ = seen.shape
+            if width < 50:
+                return False
+            camera = View(width / frame["width"], 0.0, 0.0).camera(frame, width, height)
+            T_camera_object = pose.inverse(np.array(frame["T_world_camera"])) @ T_world_object
+            expected = np.argwhere(render_depth(image.model, camera, T_camera_object) > 0)
+            assert len(expected) > 20
+            drawn = np.argwhere(seen[..., 3] > 128)
+            if len(drawn) < 10 or np.linalg.norm(drawn.mean(axis=0) - expected.mean(axis=0)) > 2:
+                return False
+        return True
+
+    wait_until(are_drawn, "the outline in every thumbnail", 20)
+    first, _, third = image.frames
+    current = page.locator("#frame-list [aria-current]")
+    page.get_by_role("button", name=f"Show frame {third['image_id']}").click()
+    wait_until(lambda: desk.state["frame_id"] == third["id"], "the frame that was clicked")
+    expect(current).to_have_accessible_name(f"Show frame {third['image_id']}")
+    expect(page.locator("#frame-place")).to_have_text("3 of 3")
+    expect(page.locator("#frame-next")).to_be_disabled()
+    take_picture(page, "label-frames")
+    page.keyboard.press(",")
+    expect(page.locator("#frame-place")).to_have_text("2 of 3")
+    page.get_by_role("button", name="Previous frame").click()
+    expect(page.locator("#frame-place")).to_have_text("1 of 3")
+    assert desk.state["frame_id"] == first["id"]
+    assert len(desk.events("frame", 3)) == 3
+
+
+def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser) -> None:
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, color_scheme="dark")
+    context.add_init_script(NO_WEBGL)
+    try:
+        page = context.new_page()
+        page.goto(server.new_link("without webgl"))
+        Desk(page, server, "mug")
+        expect(page.locator("#no-outline")).to_have_text("Without WebGL 2 no outline can be drawn.")
+        expect(page.locator("#blend")).to_be_hidden()
+        expect(page.locator("#color")).to_be_visible()
+        take_picture(page, "label-without-webgl")
+    finally:
+        context.close()
