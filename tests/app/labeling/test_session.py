@@ -9,8 +9,9 @@ import pytest
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import History, Step
-from app.labeling.session import ActionError, LabelingSession, SessionState
+from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
+from app.labeling.track import ActionError
 from app.tables import EstimateRow
 from registration_core import Estimate, Hypothesis, SnapConfig, pose
 from tests.app.labeling.test_degrees_of_freedom import about, turn

@@ -1,0 +1,173 @@
+"""The machine's hand on the object: the snaps it was asked for, what they brought, and what it offers."""
+
+import secrets
+import uuid
+from collections.abc import Callable
+from dataclasses import replace
+
+from app.auth import Actor
+from app.event_log import NewEvent
+from app.labeling.history import Step
+from app.labeling.snap_exchange import (
+    Offer,
+    RequestSnap,
+    SnapFailure,
+    SnapOrder,
+    SnapResult,
+    SnapStatus,
+    estimate_row,
+    stored_spread,
+)
+from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
+from app.labeling.track import ActionError, Track
+from registration_core import SnapConfig
+
+
+class Machine:
+    """One at a time, please: the session that owns it lets nobody in while somebody else is.
+
+    Args:
+        registration_id: Whose estimates these are.
+        track: The object's way, which results are put on.
+        request_snap: Hands an order to the workers.
+    """
+
+    def __init__(self, registration_id: int, track: Track, request_snap: RequestSnap) -> None:
+        self._registration_id = registration_id
+        self._track = track
+        self._request_snap = request_snap
+        self._cancel: Callable[[], None] | None = None
+        self.status: SnapStatus | None = None
+        """Of the last snap."""
+        self.offer: Offer | None = None
+
+    def snap(
+        self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
+    ) -> str:
+        """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
+        self.abandon(actor, "superseded")
+        order = self._order(config, seed, start_spread)
+        self._track.record(
+            NewEvent(
+                kind="snap_requested",
+                actor=actor,
+                T_before=order.T_world_object.tolist(),
+                snap_id=order.snap_id,
+                detail={
+                    "seed": order.seed,
+                    "config": order.config.to_dict(),
+                    "start_spread": stored_spread(order.start_spread),
+                    "frame_id": order.frame_id,
+                },
+            )
+        )
+        self.status = SnapStatus(order.snap_id)
+        self.offer = None
+        self._track.message = None
+        then = self._track.history.current
+        self._cancel = self._request_snap(
+            order,
+            lambda share: self._progressed(order.snap_id, share),
+            lambda outcome: self._ended(order, then, outcome),
+        )
+        return order.snap_id
+
+    def abandon(self, actor: Actor, reason: str) -> None:
+        """Stop the snap that is under way; nothing happens where there is none."""
+        if self.status is None or not self.status.is_live:
+            return
+        assert self._cancel is not None
+        self._track.record(
+            NewEvent(kind="snap_cancelled", actor=actor, snap_id=self.status.id, detail={"reason": reason})
+        )
+        self._cancel()
+        self.status = replace(self.status, state="cancelled")
+
+    def accept(self, actor: Actor) -> None:
+        """Take the pose that is offered."""
+        offer = self._require_offer()
+        step = Step(offer.T_world_object, offer.confidence)
+        self._track.push(self._track.move_event("accept", actor, step, offer.snap_id), step)
+        self.offer = None
+
+    def dismiss(self, actor: Actor) -> None:
+        """Decline the pose that is offered."""
+        offer = self._require_offer()
+        self._track.record(NewEvent(kind="dismiss", actor=actor, snap_id=offer.snap_id))
+        self.offer = None
+
+    def _order(
+        self, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
+    ) -> SnapOrder:
+        history = self._track.as_if_let_go
+        if start_spread is Unsaid.FROM_DRAGS:
+            start_spread = spread_from_drags(history, self._track.pivot, config.spread)
+        return SnapOrder(
+            snap_id=uuid.uuid4().hex,
+            frame_id=self._track.frame_id,
+            T_world_object=history.current.T_world_object,
+            config=config,
+            seed=secrets.randbelow(2**31) if seed is None else seed,
+            start_spread=start_spread,
+        )
+
+    def _progressed(self, snap_id: str, share: float) -> None:
+        if self._is_current(snap_id):
+            assert self.status is not None
+            progress = max(self.status.progress, min(1.0, share))
+            self.status = replace(self.status, state="running", progress=progress)
+
+    def _ended(self, order: SnapOrder, then: Step, outcome: SnapResult | SnapFailure) -> None:
+        if not self._is_current(order.snap_id):
+            return
+        assert self.status is not None
+        try:
+            if isinstance(outcome, SnapFailure):
+                self._fail(order, str(outcome))
+            else:
+                self._take(order, then, outcome)
+        except Exception as error:
+            message = f"The result could not be saved: {error}"
+            self.status = replace(self.status, state="failed", message=message)
+            raise
+
+    def _take(self, order: SnapOrder, then: Step, result: SnapResult) -> None:
+        estimate = result.estimate
+        moved = self._track.drag is not None or self._track.history.current is not then
+        event = NewEvent(
+            kind="snap_offered" if moved else "snap_applied",
+            actor=Actor.MACHINE,
+            T_before=order.T_world_object.tolist(),
+            T_after=result.T_world_object.tolist(),
+            snap_id=order.snap_id,
+            duration_seconds=estimate.seconds,
+            detail={"confidence": estimate.confidence},
+        )
+        row = estimate_row(self._registration_id, order, result)
+        if moved:
+            self._track.record(event, row)
+            self.offer = Offer(order.snap_id, result.T_world_object, estimate.confidence)
+        else:
+            self._track.push(event, Step(result.T_world_object, estimate.confidence), row)
+        assert self.status is not None
+        self.status = replace(self.status, state="done", progress=1.0)
+
+    def _fail(self, order: SnapOrder, message: str) -> None:
+        assert self.status is not None
+        self._track.record(
+            NewEvent(
+                kind="snap_failed",
+                actor=Actor.MACHINE,
+                snap_id=order.snap_id,
+                detail={"message": message},
+            )
+        )
+        self.status = replace(self.status, state="failed", message=message)
+
+    def _is_current(self, snap_id: str) -> bool:
+        return self.status is not None and self.status.id == snap_id and self.status.is_live
+
+    def _require_offer(self) -> Offer:
+        if self.offer is None:
+            raise ActionError("The machine offers no pose at present.")
+        return self.offer
