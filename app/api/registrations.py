@@ -35,6 +35,7 @@ class SnapOut(BaseModel):
     """The last snap of a registration."""
 
     id: str
+    asked_by: str = Field(description="human, script, or in `auto` the machine by itself")
     state: str
     progress: float
     message: str | None
@@ -46,6 +47,7 @@ class OfferOut(BaseModel):
     snap_id: str
     T_world_object: Pose
     confidence: float
+    quiet: bool = Field(description="Nobody asked for it: it can be taken, and asks for no answer.")
 
 
 class RegistrationOut(BaseModel):
@@ -213,7 +215,9 @@ def _snap_out(state: SessionState) -> SnapOut | None:
     snap = state.snap
     if snap is None:
         return None
-    return SnapOut(id=snap.id, state=snap.state, progress=snap.progress, message=snap.message)
+    return SnapOut(
+        id=snap.id, asked_by=snap.asked_by, state=snap.state, progress=snap.progress, message=snap.message
+    )
 
 
 def _offer_out(state: SessionState) -> OfferOut | None:
@@ -224,6 +228,7 @@ def _offer_out(state: SessionState) -> OfferOut | None:
         snap_id=offer.snap_id,
         T_world_object=offer.T_world_object.tolist(),
         confidence=offer.confidence,
+        quiet=offer.quiet,
     )
 
 

@@ -5,6 +5,8 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import product
+from typing import cast
 
 import numpy as np
 from sqlalchemy import select
@@ -15,15 +17,17 @@ from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog, NewEvent
 from app.labeling.history import replay
+from app.labeling.machine import SamePose
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from app.memory import give_back
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
-from app.tables import EstimateRow, Frame, Registration, Scene, Task
+from app.tables import Condition, EstimateRow, Frame, Registration, Scene, Task
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, pose
+from registration_core.pose_error import mssd
 from registration_core.problem import region_of_interest
 
 logger = logging.getLogger(__name__)
@@ -190,6 +194,8 @@ class Desk:
             frame_id=frame_id,
             frame_ids=tuple(frames),
             pivot=model.centre,
+            condition=cast(Condition, task.condition),
+            same_pose=_same_pose_of(model),
             record_event=record_event,
             request_snap=request_snap,
         )
@@ -284,6 +290,17 @@ class _Shown:
         distance = np.linalg.norm(cloud.points - np.array(frame.T_world_camera)[:3, 3], axis=1)
         footprint = float(np.median(distance)) / frame.fx if len(distance) else 0.001
         self._view.show_cloud(cloud.points, cloud.colors, point_size=footprint)
+
+
+def _same_pose_of(model: ObjectModel) -> SamePose:
+    """Two poses are the same where a snap's confidence calls both right: an MSSD of 5 % of the diameter."""
+    sides = zip(model.vertices.min(axis=0), model.vertices.max(axis=0), strict=True)
+    corners = np.array(list(product(*sides)))
+
+    def same(T_a: np.ndarray, T_b: np.ndarray) -> bool:
+        return mssd(T_a, T_b, corners, model.symmetry_transforms) < 0.05 * model.diameter
+
+    return same
 
 
 def _close(seat: Seat) -> None:

@@ -19,8 +19,16 @@ from app.labeling.snap_exchange import (
     stored_spread,
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
-from app.labeling.track import ActionError, Track
+from app.labeling.track import ActionError, Array, Track
+from app.tables import Condition
 from registration_core import SnapConfig
+
+TAKE_OVER_CONFIDENCE = 0.9
+"""From here on the machine puts the object by itself, in `auto`. Confidence is calibrated: of ten poses that
+it takes over at least nine are right, and the tenth costs the operator one key."""
+
+SamePose = Callable[[Array, Array], bool]
+"""Whether two poses T_world_object are one and the same, as far as anybody could tell."""
 
 
 class Machine:
@@ -29,14 +37,27 @@ class Machine:
     Args:
         registration_id: Whose estimates these are.
         track: The object's way, which results are put on.
+        condition: What the machine may do in this task.
+        same_pose: Tells whether the operator has seen a result before.
         request_snap: Hands an order to the workers.
     """
 
-    def __init__(self, registration_id: int, track: Track, request_snap: RequestSnap) -> None:
+    def __init__(
+        self,
+        registration_id: int,
+        track: Track,
+        condition: Condition,
+        same_pose: SamePose,
+        request_snap: RequestSnap,
+    ) -> None:
         self._registration_id = registration_id
         self._track = track
+        self._condition = condition
+        self._same_pose = same_pose
         self._request_snap = request_snap
         self._cancel: Callable[[], None] | None = None
+        self._taken_over: list[Array] = []
+        """Poses that the machine put the object at by itself."""
         self.status: SnapStatus | None = None
         """Of the last snap."""
         self.offer: Offer | None = None
@@ -45,6 +66,7 @@ class Machine:
         self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
     ) -> str:
         """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
+        self._require_machine()
         self.abandon(actor, "superseded")
         order = self._order(config, seed, start_spread)
         self._track.record(
@@ -61,7 +83,7 @@ class Machine:
                 },
             )
         )
-        self.status = SnapStatus(order.snap_id)
+        self.status = SnapStatus(order.snap_id, actor)
         self.offer = None
         self._track.message = None
         then = self._track.history.current
@@ -71,6 +93,11 @@ class Machine:
             lambda outcome: self._ended(order, then, outcome),
         )
         return order.snap_id
+
+    def take_turn(self) -> None:
+        """The operator has let go of the object: in `auto`, snap without being asked."""
+        if self._condition == "auto":
+            self.snap(Actor.MACHINE, SnapConfig(), None, Unsaid.FROM_DRAGS)
 
     def abandon(self, actor: Actor, reason: str) -> None:
         """Stop the snap that is under way; nothing happens where there is none."""
@@ -132,25 +159,33 @@ class Machine:
             raise
 
     def _take(self, order: SnapOrder, then: Step, result: SnapResult) -> None:
-        estimate = result.estimate
+        assert self.status is not None
+        estimate, unasked = result.estimate, self.status.asked_by is Actor.MACHINE
         moved = self._track.drag is not None or self._track.history.current is not then
+        applied = not moved and (not unasked or self._may_take_over(result))
         event = NewEvent(
-            kind="snap_offered" if moved else "snap_applied",
+            kind="snap_applied" if applied else "snap_offered",
             actor=Actor.MACHINE,
             T_before=order.T_world_object.tolist(),
             T_after=result.T_world_object.tolist(),
             snap_id=order.snap_id,
             duration_seconds=estimate.seconds,
-            detail={"confidence": estimate.confidence},
+            detail={"confidence": estimate.confidence}
+            | ({"threshold": TAKE_OVER_CONFIDENCE} if unasked else {}),
         )
         row = estimate_row(self._registration_id, order, result)
-        if moved:
-            self._track.record(event, row)
-            self.offer = Offer(order.snap_id, result.T_world_object, estimate.confidence)
-        else:
+        if applied:
             self._track.push(event, Step(result.T_world_object, estimate.confidence), row)
-        assert self.status is not None
+            self._taken_over += [result.T_world_object] if unasked else []
+        else:
+            self._track.record(event, row)
+            self.offer = Offer(order.snap_id, result.T_world_object, estimate.confidence, quiet=unasked)
         self.status = replace(self.status, state="done", progress=1.0)
+
+    def _may_take_over(self, result: SnapResult) -> bool:
+        # What the operator took back, by undo or by dragging on, is not forced on them again.
+        taken_back = any(self._same_pose(result.T_world_object, T) for T in self._taken_over)
+        return result.estimate.confidence >= TAKE_OVER_CONFIDENCE and not taken_back
 
     def _fail(self, order: SnapOrder, message: str) -> None:
         assert self.status is not None
@@ -166,6 +201,10 @@ class Machine:
 
     def _is_current(self, snap_id: str) -> bool:
         return self.status is not None and self.status.id == snap_id and self.status.is_live
+
+    def _require_machine(self) -> None:
+        if self._condition == "manual":
+            raise ActionError("This task is done by hand alone: there is no machine to help.")
 
     def _require_offer(self) -> Offer:
         if self.offer is None:

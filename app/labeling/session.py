@@ -18,10 +18,11 @@ from app.event_log import NewEvent
 from app.labeling.degrees_of_freedom import degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
-from app.labeling.machine import Machine
+from app.labeling.machine import Machine, SamePose
 from app.labeling.snap_exchange import Offer, RequestSnap, SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.start_spread import StartSpread, Unsaid
 from app.labeling.track import ActionError, RecordEvent, Track
+from app.tables import Condition
 from registration_core import SnapConfig
 
 Array = NDArray[np.float64]
@@ -55,6 +56,8 @@ class LabelingSession:
         frame_id: The frame that is shown and snapped against.
         frame_ids: The scene's frames.
         pivot: The gizmo's place (3,) on the object, metres, in the object's frame.
+        condition: What the machine may do.
+        same_pose: Tells whether two poses are one, as far as anybody could tell.
         record_event: Writes an event durably; raises where it cannot.
         request_snap: Hands an order to the workers.
     """
@@ -67,6 +70,8 @@ class LabelingSession:
         frame_id: int,
         frame_ids: Sequence[int],
         pivot: Array,
+        condition: Condition,
+        same_pose: SamePose,
         record_event: RecordEvent,
         request_snap: RequestSnap,
     ) -> None:
@@ -75,7 +80,9 @@ class LabelingSession:
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
         self._track = Track(history, frame_id, pivot, record_event)
-        self._machine = Machine(registration_id, self._track, self._request_from_workers)
+        self._machine = Machine(
+            registration_id, self._track, condition, same_pose, self._request_from_workers
+        )
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
         self.last_used = time.monotonic()
@@ -135,18 +142,14 @@ class LabelingSession:
             self._changed()
 
     def end_drag(self) -> None:
-        """The operator let go: the drag is written down; where that fails, it is taken back and said so."""
+        """The operator let go: the drag is written down; where that fails, it is taken back and said so.
+
+        In `auto` the machine has its turn then.
+        """
         with self._lock:
-            drag, self._track.drag = self._track.drag, None
-            if drag is None:
-                return
-            event = drag.event(self._track.pivot)
             try:
-                if event is not None:
-                    self._move(event, Step(drag.T_now, dragged=True))
-            except Exception as error:
-                self._track.message = f"The last drag could not be saved and was taken back: {error}"
-                raise
+                if self._write_drag():
+                    self._machine.take_turn()
             finally:
                 self._changed()
 
@@ -284,6 +287,19 @@ class LabelingSession:
         self._require_open()
         if self._track.drag is not None:
             raise ActionError("The object is being dragged; let go of it first.")
+
+    def _write_drag(self) -> bool:
+        """End the drag; tells whether it moved anything."""
+        drag, self._track.drag = self._track.drag, None
+        event = None if drag is None else drag.event(self._track.pivot)
+        if drag is None or event is None:
+            return False
+        try:
+            self._move(event, Step(drag.T_now, dragged=True))
+        except Exception as error:
+            self._track.message = f"The last drag could not be saved and was taken back: {error}"
+            raise
+        return True
 
     def _move(self, event: NewEvent, step: Step) -> None:
         self._track.push(event, step)
