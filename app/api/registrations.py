@@ -50,11 +50,19 @@ class OfferOut(BaseModel):
     quiet: bool = Field(description="Nobody asked for it: it can be taken, and asks for no answer.")
 
 
+class LiveOut(BaseModel):
+    """Where a snap would land now."""
+
+    T_world_object: Pose
+    confidence: float
+
+
 class RegistrationOut(BaseModel):
     """One operator's work on one task, now."""
 
     id: int
     task_id: int
+    condition: str
     state: str
     frame_id: int
     T_world_object: Pose
@@ -67,6 +75,8 @@ class RegistrationOut(BaseModel):
     """Whether all of it is on the disk: a drag is when it ends."""
     snap: SnapOut | None
     offer: OfferOut | None
+    is_live: bool
+    live: LiveOut | None
     message: str | None
     view_url: str
 
@@ -82,6 +92,12 @@ class FrameChoice(BaseModel):
     """A frame of the scene."""
 
     frame_id: int
+
+
+class LiveChoice(BaseModel):
+    """Whether the machine is to show where a snap would land, all the time."""
+
+    on: bool
 
 
 class EventOut(BaseModel):
@@ -129,6 +145,13 @@ def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> Registratio
 def show_frame(body: FrameChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Show, and snap against, another frame of the scene."""
     seat.session.show_frame(body.frame_id, identity.actor)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/live")
+def set_live(body: LiveChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    """Turn live snapping on or off."""
+    seat.session.set_live(body.on, identity.actor)
     return registration_out(seat)
 
 
@@ -195,6 +218,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
     return RegistrationOut(
         id=state.registration_id,
         task_id=seat.registration.task_id,
+        condition=seat.registration.task.condition,
         state=state.state,
         frame_id=state.frame_id,
         T_world_object=state.T_world_object.tolist(),
@@ -206,6 +230,8 @@ def registration_out(seat: Seat) -> RegistrationOut:
         saved=not state.dragging,
         snap=_snap_out(state),
         offer=_offer_out(state),
+        is_live=state.is_live,
+        live=_live_out(state),
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
     )
@@ -230,6 +256,13 @@ def _offer_out(state: SessionState) -> OfferOut | None:
         confidence=offer.confidence,
         quiet=offer.quiet,
     )
+
+
+def _live_out(state: SessionState) -> LiveOut | None:
+    live = state.live
+    if live is None:
+        return None
+    return LiveOut(T_world_object=live.T_world_object.tolist(), confidence=live.confidence)
 
 
 def _event_out(row: Event) -> EventOut:

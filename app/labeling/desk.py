@@ -19,7 +19,7 @@ from app.event_log import EventLog, NewEvent
 from app.labeling.history import replay
 from app.labeling.machine import SamePose
 from app.labeling.session import LabelingSession, SessionState
-from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from app.memory import give_back
 from app.scene_data import SceneData, camera_of
@@ -34,6 +34,10 @@ logger = logging.getLogger(__name__)
 
 IDLE_SECONDS = 30 * 60
 """A session that nobody looks at and nobody used for so long is closed; its log brings it back."""
+
+
+LIVE_PRIORITY = -1
+"""Where workers have to choose, they do what somebody waits for first."""
 
 
 class NotFoundError(Exception):
@@ -223,7 +227,8 @@ class Desk:
         except ValueError as error:
             on_end(SnapFailure(f"The snap cannot work on this: {error}."))
             return lambda: None
-        return self._snapper.request(job, model, on_progress, ended)
+        priority = LIVE_PRIORITY if order.is_live else 0
+        return self._snapper.request(job, model, on_progress, ended, priority)
 
     def _job(
         self, frame: Frame, model: ObjectModel, order: SnapOrder, T_camera_object: np.ndarray
@@ -236,7 +241,7 @@ class Desk:
             left, top, depth = 0, 0, whole
         return SnapJob(
             snap_id=order.snap_id,
-            topic=self._snapper.topic,
+            topic="" if order.is_live else self._snapper.topic,
             model_hash=model.content_hash,
             depth=np.ascontiguousarray(depth),
             camera=camera.cropped(left, top, depth.shape[1], depth.shape[0]),
@@ -274,6 +279,7 @@ class _Shown:
         self._data = data
         self._frames = frames
         self._frame_id: int | None = None
+        self._ghost: Offer | None = None
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -282,6 +288,10 @@ class _Shown:
             self._show_cloud(self._frames[state.frame_id])
         if not state.dragging:
             self._view.move_object(state.T_world_object)
+        ghost = state.live or state.offer
+        if ghost is not self._ghost:
+            self._ghost = ghost
+            self._view.show_ghost(ghost.T_world_object if ghost else None)
         if state.state != "open":
             self._view.lock_object()
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import Step
+from app.labeling.live_snap import LiveSnap
 from app.labeling.snap_exchange import (
     Offer,
     RequestSnap,
@@ -26,6 +27,9 @@ from registration_core import SnapConfig
 TAKE_OVER_CONFIDENCE = 0.9
 """From here on the machine puts the object by itself, in `auto`. Confidence is calibrated: of ten poses that
 it takes over at least nine are right, and the tenth costs the operator one key."""
+
+LIVE_SEED = 0
+"""Always the same, so that the ghost of an object that rests does so, too."""
 
 SamePose = Callable[[Array, Array], bool]
 """Whether two poses T_world_object are one and the same, as far as anybody could tell."""
@@ -56,6 +60,7 @@ class Machine:
         self._same_pose = same_pose
         self._request_snap = request_snap
         self._cancel: Callable[[], None] | None = None
+        self._live = LiveSnap(request_snap)
         self._taken_over: list[Array] = []
         """Poses that the machine put the object at by itself."""
         self.status: SnapStatus | None = None
@@ -94,6 +99,37 @@ class Machine:
         )
         return order.snap_id
 
+    @property
+    def is_live(self) -> bool:
+        """Whether live snapping is on."""
+        return self._live.is_on
+
+    @property
+    def live(self) -> Offer | None:
+        """Where a snap would land."""
+        return self._live.found.offer if self._live.found else None
+
+    def set_live(self, on: bool, actor: Actor) -> None:
+        """Turn live snapping on or off."""
+        if on == self._live.is_on:
+            return
+        self._require_machine()
+        self._track.record(NewEvent(kind="live", actor=actor, detail={"on": on}))
+        self._live.is_on = on
+
+    def follow(self, is_open: bool) -> None:
+        """Let live snapping keep up with what changed. A pose that the machine found needs no ghost."""
+        track = self._track
+        if self.live is not None:
+            self.offer = None  # one pose at a time, the newest
+        snapping = self.status is not None and self.status.is_live
+        by_hand = track.drag is not None or track.history.current.confidence is None
+        offered = self.offer is not None and track.drag is None
+        if self.is_live and is_open and by_hand and not snapping and not offered:
+            self._live.follow(track.T_world_object, track.frame_id, self._live_order)
+        else:
+            self._live.rest()
+
     def take_turn(self) -> None:
         """The operator has let go of the object: in `auto`, snap without being asked."""
         if self._condition == "auto":
@@ -110,18 +146,31 @@ class Machine:
         self._cancel()
         self.status = replace(self.status, state="cancelled")
 
+    def close(self) -> None:
+        """Stop whatever is under way, for good."""
+        self.abandon(Actor.MACHINE, "session closed")
+        self._live.is_on = False
+        self._live.rest()
+
     def accept(self, actor: Actor) -> None:
-        """Take the pose that is offered."""
-        offer = self._require_offer()
+        """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
+        look = self._live.found
+        offer = look.offer if look else self._require_offer()
         step = Step(offer.T_world_object, offer.confidence)
-        self._track.push(self._track.move_event("accept", actor, step, offer.snap_id), step)
+        event = self._track.move_event("accept", actor, step, offer.snap_id)
+        row = estimate_row(self._registration_id, look.order, look.result) if look else None
+        self._track.push(event, step, row)
         self.offer = None
+        self._live.rest()
 
     def dismiss(self, actor: Actor) -> None:
         """Decline the pose that is offered."""
         offer = self._require_offer()
         self._track.record(NewEvent(kind="dismiss", actor=actor, snap_id=offer.snap_id))
         self.offer = None
+
+    def _live_order(self) -> SnapOrder:
+        return replace(self._order(SnapConfig(), LIVE_SEED, Unsaid.FROM_DRAGS), is_live=True)
 
     def _order(
         self, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None

@@ -43,6 +43,9 @@ class SessionState:
     dragging: bool
     snap: SnapStatus | None
     offer: Offer | None
+    is_live: bool
+    live: Offer | None
+    """Where a snap would land now."""
     message: str | None
 
 
@@ -104,6 +107,8 @@ class LabelingSession:
                 dragging=track.drag is not None,
                 snap=self._machine.status,
                 offer=self._machine.offer,
+                is_live=self._machine.is_live,
+                live=self._machine.live,
                 message=track.message,
             )
 
@@ -254,10 +259,19 @@ class LabelingSession:
             self._changed()
 
     def accept(self, actor: Actor) -> None:
-        """Take the pose that the machine offers."""
+        """Take the pose that the machine offers, or shows live; this one even out of the operator's hand."""
         with self._lock:
+            if self._machine.live is not None:
+                self._write_drag()
             self._require_free_hands()
             self._machine.accept(actor)
+            self._changed()
+
+    def set_live(self, on: bool, actor: Actor) -> None:
+        """Turn live snapping on or off."""
+        with self._lock:
+            self._require_open()
+            self._machine.set_live(on, actor)
             self._changed()
 
     def dismiss(self, actor: Actor) -> None:
@@ -270,7 +284,7 @@ class LabelingSession:
     def close(self) -> None:
         """End the session, cancelling a snap under way. What was recorded stays, and can be gone on with."""
         with self._lock:
-            self._machine.abandon(Actor.MACHINE, "session closed")
+            self._machine.close()
             self._listeners.clear()
 
     # -- helpers -----------------------------------------------------------------------------------
@@ -327,6 +341,7 @@ class LabelingSession:
 
     def _changed(self) -> None:
         self.last_used = time.monotonic()
+        self._machine.follow(self._is_open)
         state = self.snapshot()
         for listener in tuple(self._listeners):
             listener(state)

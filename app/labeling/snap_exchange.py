@@ -26,6 +26,8 @@ class SnapOrder:
     seed: int
     start_spread: StartSpread | None
     """How far off the pose may be; None where that is unknown."""
+    is_live: bool = False
+    """Nobody waits for it: others go first, and its progress is of no interest."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,10 @@ Array = NDArray[np.float64]
 
 HUMAN_COLOR = (255, 149, 64)
 """Of what the operator holds; the same in the pages' style sheet."""
+MACHINE_COLOR = (108, 192, 255)
+"""Of what the machine shows; the same in the pages' style sheet."""
 MESH_OPACITY = 0.55
+GHOST_OPACITY = 0.4
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
 STEP_BACK = 1.15
@@ -61,6 +64,8 @@ class SceneView:
         )
         self._server.scene.set_background_image(np.full((1, 1, 3), BACKGROUND, dtype=np.uint8))
         self._place_camera(first_view)
+        self._model = model
+        self._ghost: viser.MeshHandle | None = None
         self._gizmo = self._add_object(model, T_world_object)
         self._follow_drags(drag)
 
@@ -81,6 +86,20 @@ class SceneView:
         with self._server.atomic():
             self._gizmo.position = position
             self._gizmo.wxyz = wxyz
+
+    def show_ghost(self, T_world_object: Array | None) -> None:
+        """Show where the machine would put the object; None shows nothing."""
+        if T_world_object is None:
+            if self._ghost is not None:
+                self._ghost.visible = False
+            return
+        if self._ghost is None:
+            self._ghost = self._add_mesh("/ghost", MACHINE_COLOR, GHOST_OPACITY)
+        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+        with self._server.atomic():
+            self._ghost.position = position
+            self._ghost.wxyz = wxyz
+            self._ghost.visible = True
 
     def lock_object(self) -> None:
         """Take the gizmo's handles away; the object stays in view."""
@@ -114,17 +133,20 @@ class SceneView:
             position=position,
             wxyz=wxyz,
         )
-        self._server.scene.add_mesh_simple(
-            "/object/mesh",
-            vertices=(model.vertices - model.centre).astype(np.float32),
-            faces=model.faces,
-            color=HUMAN_COLOR,
-            opacity=MESH_OPACITY,
+        self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
+        return gizmo
+
+    def _add_mesh(self, name: str, color: tuple[int, int, int], opacity: float) -> viser.MeshHandle:
+        return self._server.scene.add_mesh_simple(
+            name,
+            vertices=(self._model.vertices - self._model.centre).astype(np.float32),
+            faces=self._model.faces,
+            color=color,
+            opacity=opacity,
             side="double",
             cast_shadow=False,
             receive_shadow=False,
         )
-        return gizmo
 
     def _follow_drags(self, drag: DragHandlers) -> None:
         @self._gizmo.on_update

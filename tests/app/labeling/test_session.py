@@ -203,6 +203,7 @@ ACTIONS: dict[str, Callable[[LabelingSession], object]] = {
     "redo": lambda session: session.redo(Actor.HUMAN),
     "frame": lambda session: session.show_frame(FRAMES[1], Actor.HUMAN),
     "snap_requested": lambda session: session.snap(Actor.HUMAN),
+    "live": lambda session: session.set_live(True, Actor.HUMAN),
     "accept": lambda session: session.accept(Actor.HUMAN),
     "dismiss": lambda session: session.dismiss(Actor.HUMAN),
     "submit": lambda session: session.submit(Actor.HUMAN),
