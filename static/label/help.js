@@ -1,14 +1,16 @@
 /** The keyboard overlay, written from the bindings themselves. */
 
 import { byId, element } from "../dom.js";
+import { MOD } from "./keys.js";
 
-const SHOWN = { Mod: /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl", Escape: "Esc" };
+const SHOWN = { Mod: MOD, Escape: "Esc" };
 
-/** Fills the overlay with {keys, does}; returns the function that opens it. */
+/** Fills the overlay with {keys, does, machine?}; returns the function that opens it. */
 export function setUpHelp(bindings) {
-  const rows = bindings.map(({ keys, does }) =>
-    element("div", {}, element("dt", {}, ...keyCaps(keys)), element("dd", {}, does)),
-  );
+  const rows = bindings.map(({ keys, does, machine }) => {
+    const props = machine ? { "data-machine": "" } : {};
+    return element("div", props, element("dt", {}, ...keyCaps(keys)), element("dd", {}, does));
+  });
   byId("key-list").replaceChildren(...rows);
   const open = () => byId("keys").showModal();
   byId("help").addEventListener("click", open);

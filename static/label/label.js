@@ -12,6 +12,7 @@ import { messageArea } from "../message.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
+import { machinePart } from "./machine.js";
 import { showNext } from "./next.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
 import { followRegistration } from "./stream.js";
@@ -30,8 +31,9 @@ const page = {
   path,
   registration: () => registration,
   isConnected: () => connected,
+  act,
 };
-const PARTS = [imagePart(page)];
+const PARTS = [imagePart(page), machinePart(page)];
 
 const ACTIONS = {
   snap: requestSnap,
@@ -45,10 +47,10 @@ const ACTIONS = {
 };
 
 const BINDINGS = [
-  { keys: ["Space"], does: "Snap", run: () => act("snap") },
-  { keys: ["Escape"], does: "Cancel the snap", run: () => act("cancel") },
-  { keys: ["Y"], does: "Accept the machine's offer", run: () => act("offer-accept") },
-  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss") },
+  { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
+  { keys: ["Escape"], does: "Cancel the snap", run: () => act("cancel"), machine: true },
+  { keys: ["Y"], does: "Accept the machine's offer or ghost", run: () => act("offer-accept"), machine: true },
+  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
   { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
   ...PARTS.flatMap((part) => part.bindings ?? []),
@@ -126,6 +128,7 @@ function show(received) {
 
 function reportSnap(before, snap) {
   if (!snap || (before?.id === snap.id && before?.state === snap.state)) return;
+  if (snap.asked_by === "machine") return;
   if (snap.state !== "failed") message.clear();
   else message.show(snap.message, "problem", { label: "Try again", run: () => act("snap") });
 }
@@ -152,7 +155,7 @@ async function act(name) {
 async function requestSnap() {
   const before = registration.snap;
   snapRequest = post(path("snaps"), {});
-  show({ ...registration, snap: { id: null, state: "queued", progress: 0, message: null } });
+  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null } });
   try {
     await snapRequest;
   } catch (error) {
