@@ -19,7 +19,9 @@ HUMAN_COLOR = (255, 149, 64)
 MACHINE_COLOR = (108, 192, 255)
 """Of what the machine shows; the same in the pages' style sheet."""
 MESH_OPACITY = 0.55
-GHOST_OPACITY = 0.4
+GHOST_OPACITY = 0.6
+GHOST_SIZE = 1.03
+"""Times the object's own, since measured points would hide a ghost that lies where it should."""
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
 STEP_BACK = 1.15
@@ -94,7 +96,7 @@ class SceneView:
                 self._ghost.visible = False
             return
         if self._ghost is None:
-            self._ghost = self._add_mesh("/ghost", MACHINE_COLOR, GHOST_OPACITY)
+            self._ghost = self._add_mesh("/ghost", MACHINE_COLOR, GHOST_OPACITY, GHOST_SIZE)
         position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
         with self._server.atomic():
             self._ghost.position = position
@@ -136,10 +138,12 @@ class SceneView:
         self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
         return gizmo
 
-    def _add_mesh(self, name: str, color: tuple[int, int, int], opacity: float) -> viser.MeshHandle:
+    def _add_mesh(
+        self, name: str, color: tuple[int, int, int], opacity: float, size: float = 1.0
+    ) -> viser.MeshHandle:
         return self._server.scene.add_mesh_simple(
             name,
-            vertices=(self._model.vertices - self._model.centre).astype(np.float32),
+            vertices=(size * (self._model.vertices - self._model.centre)).astype(np.float32),
             faces=self._model.faces,
             color=color,
             opacity=opacity,
