@@ -41,7 +41,7 @@ def judge(candidates: Array32, counts: Array, near: int, prior: Prior, config: S
         counts: (N, evidence.COUNT), their evidence.
     """
     values = scores(counts, heavy_tails(candidates, prior), config)
-    return Judgement(chosen(values, near, config), values, counts)
+    return Judgement(chosen(values, near, lead(counts[0], config)), values, counts)
 
 
 def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
@@ -52,17 +52,25 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
     return counts @ weights + config.match_share * match_shares(counts) - config.prior * tails
 
 
-def chosen(scores: Array, near: int, config: SelectionConfig) -> int:
+def lead(start: Array, config: SelectionConfig) -> float:
+    """What any other pose must score more than one that stands, for a start with such counts (COUNT,): much,
+    where it fits, for then the operator is probably right.
+    """
+    fits = match_shares(start[None])[0] > config.fit_match
+    return config.lead_over_fit if fits else config.lead
+
+
+def chosen(scores: Array, near: int, lead: float) -> int:
     """The winner among the start, `near` polishes of it, and other modes.
 
-    The best polish replaces the start only where it gains `gain_near`, and another mode replaces what
-    stands then only where it gains `gain_far`: in doubt the operator is right.
+    The best polish replaces the start only where it scores better by the lead, and another mode replaces what
+    stands then only where it does so again: in doubt the operator is right.
     """
     winner = 0
-    for first, last, gain in ((1, 1 + near, config.gain_near), (1 + near, len(scores), config.gain_far)):
+    for first, last in ((1, 1 + near), (1 + near, len(scores))):
         if first < last:
             best = first + int(np.argmax(scores[first:last]))
-            if scores[best] > scores[winner] + gain:
+            if scores[best] > scores[winner] + lead:
                 winner = best
     return winner
 

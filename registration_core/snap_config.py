@@ -116,10 +116,13 @@ class SelectionConfig:
 
     prior: float = 1.7
     """Weight of the heavy-tailed prior about the start."""
-    gain_near: float = 1.5
-    """The polished start replaces the start only if it scores better by this much."""
-    gain_far: float = 1.5
-    """Another mode replaces that only if it scores better by this much."""
+    lead: float = 1.0
+    """The polished start replaces the start, and another mode replaces that, only if it scores better by this
+    much, ..."""
+    lead_over_fit: float = 4.0
+    """... or by this much where the start itself fits ..."""
+    fit_match: float = 0.7
+    """... so that more of the claimed surface than this is matched."""
     min_match: float = 0.04
     """With less of the claimed surface matched than this, the start is kept."""
     settled_match: float = 0.9

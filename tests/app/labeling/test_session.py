@@ -13,7 +13,7 @@ from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.labeling.track import ActionError
 from app.tables import Condition, EstimateRow
-from registration_core import Estimate, Hypothesis, SnapConfig, pose
+from registration_core import Ambiguity, Estimate, Hypothesis, SnapConfig, pose
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
@@ -87,7 +87,7 @@ def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
         seconds=0.25,
         evaluations=1234,
         converged=True,
-        ambiguities=(),
+        ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
     )
     return SnapResult(estimate, T, "1.2.3", "a test machine")
@@ -339,6 +339,8 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
     assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
+    (ambiguity,) = row.ambiguities
+    assert ambiguity == {"kind": "free motion", "motion": "turn", "axis": (0.0, 0.0, 1.0), "extent": 0.4}
 
 
 def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
