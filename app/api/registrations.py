@@ -1,12 +1,13 @@
 """Registrations: their state, what an operator or a script may do, the log, and the stream of changes."""
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from sqlalchemy import select
@@ -125,6 +126,9 @@ def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -
 
 
 SeatDep = Annotated[Seat, Depends(my_seat)]
+PageName = Annotated[
+    str | None, Query(max_length=40, description="Of an open page, made up by itself; scripts leave it out.")
+]
 
 
 @router.get("/{registration_id}")
@@ -189,24 +193,41 @@ def list_events(
 
 
 @router.get("/{registration_id}/stream", response_class=EventSourceResponse)
-async def stream(seat: SeatDep, services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
-    """Server-sent events: the registration at once, and again whenever it changes."""
+async def stream(
+    seat: SeatDep, services: ServicesDep, page: PageName = None
+) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: the registration at once, and again whenever it changes.
+
+    With the name of a page, another page's stream of this registration ends with the event `taken_over`.
+    """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
     leave = services.desk.watch(seat)
 
+    given_way = threading.Event()
+
     def tell(_state: SessionState) -> None:
         loop.call_soon_threadsafe(changed.set)
 
+    def give_way() -> None:
+        given_way.set()
+        loop.call_soon_threadsafe(changed.set)
+
     unsubscribe = seat.session.subscribe(tell)
+    stand_up = seat.chair.sit(page, give_way) if page else None
     try:
         while True:
             changed.clear()
+            if given_way.is_set():
+                yield ServerSentEvent(event="taken_over", data={"id": seat.registration.id})
+                return
             out = await asyncio.to_thread(registration_out, seat)
             yield ServerSentEvent(event="registration", data=out)
             await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
             await changed.wait()
     finally:
+        if stand_up:
+            stand_up()
         unsubscribe()
         leave()
 

@@ -16,6 +16,7 @@ from app import __version__
 from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog, NewEvent
+from app.labeling.chair import Chair
 from app.labeling.history import replay
 from app.labeling.machine import SamePose
 from app.labeling.session import LabelingSession, SessionState
@@ -55,6 +56,7 @@ class Seat:
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
+    chair: Chair = field(default_factory=Chair)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 

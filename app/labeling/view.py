@@ -97,7 +97,8 @@ class SceneView:
             return
         if self._ghost is None:
             self._ghost = self._add_mesh("/ghost", MACHINE_COLOR, GHOST_OPACITY, GHOST_SIZE)
-        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+        centre = pose.apply(T_world_object, self._model.centre)
+        position, wxyz = _to_viser(pose.from_rotation_translation(T_world_object[:3, :3], centre))
         with self._server.atomic():
             self._ghost.position = position
             self._ghost.wxyz = wxyz
