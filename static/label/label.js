@@ -194,6 +194,7 @@ function showClosed(title, text, retry) {
   byId("opening").hidden = true;
   byId("connection").hidden = true;
   byId("offer").hidden = true;
+  byId("note").hidden = true;
   setText(byId("closed-title"), title);
   setText(byId("closed-text"), text);
   setText(byId("closed-retry"), retry);

@@ -6,12 +6,12 @@
 import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { MOD } from "./keys.js";
+import { possible } from "./panel.js";
 
 const REMEMBERED = "snap6d.live";
 
 /** A part of the labelling page. */
 export function machinePart(page) {
-  let task = null;
   let switching = false;
   byId("live").addEventListener("click", toggle);
   byId("note-accept").addEventListener("click", () => page.act("offer-accept"));
@@ -19,17 +19,14 @@ export function machinePart(page) {
   setText(byId("note-undo-key"), `${MOD} Z`);
 
   const isWanted = () => localStorage.getItem(REMEMBERED) === "on";
-  const isPossible = (registration) =>
-    registration?.state === "open" && task.condition !== "manual" && page.isConnected();
+  const isPossible = (registration) => possible(registration, page.isConnected()).live;
 
-  function open(opened) {
-    task = opened;
+  function open(task) {
     document.body.dataset.condition = task.condition;
   }
 
   function draw(registration, before) {
     const { is_live: isLive } = registration;
-    byId("live").disabled = !isPossible(registration);
     byId("live").setAttribute("aria-pressed", isLive);
     drawNote(noteFor(registration));
     const fresh = !before || (before.is_live && !isLive); // the page, or the server, has just come up

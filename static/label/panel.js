@@ -25,9 +25,11 @@ export function isSnapping({ snap }) {
 /** What can be done now, by action. */
 export function possible(registration, connected) {
   const open = registration?.state === "open" && connected;
+  const machine = open && registration.condition !== "manual";
   const shown = registration?.offer ?? registration?.live ?? null;
   return {
-    snap: open && registration.condition !== "manual",
+    snap: machine,
+    live: machine,
     cancel: open && isSnapping(registration),
     undo: open && registration.can_undo,
     redo: open && registration.can_redo,
