@@ -36,6 +36,7 @@ class _Pending:
     model: ObjectModel
     on_progress: Callable[[float], None]
     on_end: Callable[[worker.JobResult | SnapError], None]
+    priority: int
     future: Future | None = None
     begun: bool = False
     """A worker has told that it is at it, or was given the job for the second time."""
@@ -79,13 +80,15 @@ class Snapper:
         model: ObjectModel,
         on_progress: Callable[[float], None],
         on_end: Callable[[worker.JobResult | SnapError], None],
+        priority: int = 0,
     ) -> Callable[[], None]:
         """Start a snap and return the function that cancels it.
 
-        `on_end` is called once, from another thread, unless the snap is cancelled before.
+        `on_end` is called once, from another thread, unless the snap is cancelled before. Of snaps that wait
+        for a worker, those of higher `priority` go first.
         """
         with self._lock:
-            self._pending[job.snap_id] = _Pending(job, model, on_progress, on_end)
+            self._pending[job.snap_id] = _Pending(job, model, on_progress, on_end, priority)
         self._call(job.snap_id, self._submit, job.snap_id, False)
         return lambda: self._cancel(job.snap_id)
 
@@ -136,7 +139,7 @@ class Snapper:
             return
         model = pending.model if with_model else None
         future = self._client.result().submit(
-            worker.run_snap, pending.job, model, self._cache_dir, pure=False
+            worker.run_snap, pending.job, model, self._cache_dir, pure=False, priority=pending.priority
         )
         pending.future = future
         if self._find(snap_id) is None:  # cancelled in this moment

@@ -1,7 +1,7 @@
 """The database's tables. Poses are 4x4 nested lists, metres; times are UTC; files are hashes in the store."""
 
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 from sqlalchemy import (
     JSON,
@@ -18,6 +18,8 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 Pose = list[list[float]]
+Condition = Literal["manual", "snap", "auto"]
+"""What the machine does in a task: nothing, what it is asked for, or more when it is sure."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):

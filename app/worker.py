@@ -37,7 +37,7 @@ class SnapJob:
 
     snap_id: str
     topic: str
-    """Where progress is told."""
+    """Where progress is told; empty where nobody asks."""
     model_hash: str
     depth: NDArray[np.float32]
     """(H, W), metres: the part of the image that the snap may look at."""
@@ -83,7 +83,7 @@ def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = N
     for step in steps:
         if job.snap_id in _cancelled:
             raise SnapCancelledError(job.snap_id)
-        if time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
+        if job.topic and time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
             reported = time.monotonic()
             share = step.iteration / max(1, step.iterations)
             get_worker().log_event(job.topic, {"snap_id": job.snap_id, "progress": share})

@@ -13,7 +13,7 @@ from app.api.registrations import RegistrationOut, SeatDep, registration_out
 from app.labeling import placement, viewpoint
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat
-from app.labeling.session import ActionError
+from app.labeling.track import ActionError
 from app.labeling.viewpoint import Viewpoint
 from app.scene_data import SceneData, camera_of
 from app.tables import Frame

@@ -14,7 +14,7 @@ from starlette.exceptions import HTTPException
 
 from app.auth import SignInError, TooManyAttemptsError
 from app.labeling.desk import NotFoundError
-from app.labeling.session import ActionError
+from app.labeling.track import ActionError
 
 logger = logging.getLogger(__name__)
 

@@ -1,12 +1,13 @@
 """Registrations: their state, what an operator or a script may do, the log, and the stream of changes."""
 
 import asyncio
+import threading
 from collections.abc import AsyncIterator, Callable
 from datetime import datetime
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from sqlalchemy import select
@@ -36,6 +37,7 @@ class SnapOut(BaseModel):
     """The last snap of a registration."""
 
     id: str
+    asked_by: str = Field(description="human, script, or in `auto` the machine by itself")
     state: str
     progress: float
     message: str | None
@@ -47,6 +49,14 @@ class OfferOut(BaseModel):
     snap_id: str
     T_world_object: Pose
     confidence: float
+    quiet: bool = Field(description="Nobody asked for it: it can be taken, and asks for no answer.")
+
+
+class LiveOut(BaseModel):
+    """Where a snap would land now."""
+
+    T_world_object: Pose
+    confidence: float
 
 
 class RegistrationOut(BaseModel):
@@ -54,6 +64,7 @@ class RegistrationOut(BaseModel):
 
     id: int
     task_id: int
+    condition: str
     state: str
     frame_id: int
     T_world_object: Pose
@@ -68,6 +79,8 @@ class RegistrationOut(BaseModel):
     """Whether all of it is on the disk: a drag is when it ends."""
     snap: SnapOut | None
     offer: OfferOut | None
+    is_live: bool
+    live: LiveOut | None
     message: str | None
     view_url: str
 
@@ -83,6 +96,12 @@ class FrameChoice(BaseModel):
     """A frame of the scene."""
 
     frame_id: int
+
+
+class LiveChoice(BaseModel):
+    """Whether the machine is to show where a snap would land, all the time."""
+
+    on: bool
 
 
 class EventOut(BaseModel):
@@ -110,6 +129,9 @@ def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -
 
 
 SeatDep = Annotated[Seat, Depends(my_seat)]
+PageName = Annotated[
+    str | None, Query(max_length=40, description="Of an open page, made up by itself; scripts leave it out.")
+]
 
 
 @router.get("/{registration_id}")
@@ -130,6 +152,13 @@ def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> Registratio
 def show_frame(body: FrameChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Show, and snap against, another frame of the scene."""
     seat.session.show_frame(body.frame_id, identity.actor)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/live")
+def set_live(body: LiveChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    """Turn live snapping on or off."""
+    seat.session.set_live(body.on, identity.actor)
     return registration_out(seat)
 
 
@@ -167,24 +196,41 @@ def list_events(
 
 
 @router.get("/{registration_id}/stream", response_class=EventSourceResponse)
-async def stream(seat: SeatDep, services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
-    """Server-sent events: the registration at once, and again whenever it changes."""
+async def stream(
+    seat: SeatDep, services: ServicesDep, page: PageName = None
+) -> AsyncIterator[ServerSentEvent]:
+    """Server-sent events: the registration at once, and again whenever it changes.
+
+    With the name of a page, another page's stream of this registration ends with the event `taken_over`.
+    """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
     leave = services.desk.watch(seat)
 
+    given_way = threading.Event()
+
     def tell(_state: SessionState) -> None:
         loop.call_soon_threadsafe(changed.set)
 
+    def give_way() -> None:
+        given_way.set()
+        loop.call_soon_threadsafe(changed.set)
+
     unsubscribe = seat.session.subscribe(tell)
+    stand_up = seat.chair.sit(page, give_way) if page else None
     try:
         while True:
             changed.clear()
+            if given_way.is_set():
+                yield ServerSentEvent(event="taken_over", data={"id": seat.registration.id})
+                return
             out = await asyncio.to_thread(registration_out, seat)
             yield ServerSentEvent(event="registration", data=out)
             await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
             await changed.wait()
     finally:
+        if stand_up:
+            stand_up()
         unsubscribe()
         leave()
 
@@ -196,6 +242,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
     return RegistrationOut(
         id=state.registration_id,
         task_id=seat.registration.task_id,
+        condition=seat.registration.task.condition,
         state=state.state,
         frame_id=state.frame_id,
         T_world_object=state.T_world_object.tolist(),
@@ -208,6 +255,8 @@ def registration_out(seat: Seat) -> RegistrationOut:
         saved=not state.dragging,
         snap=_snap_out(state),
         offer=_offer_out(state),
+        is_live=state.is_live,
+        live=_live_out(state),
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
     )
@@ -217,7 +266,9 @@ def _snap_out(state: SessionState) -> SnapOut | None:
     snap = state.snap
     if snap is None:
         return None
-    return SnapOut(id=snap.id, state=snap.state, progress=snap.progress, message=snap.message)
+    return SnapOut(
+        id=snap.id, asked_by=snap.asked_by, state=snap.state, progress=snap.progress, message=snap.message
+    )
 
 
 def _offer_out(state: SessionState) -> OfferOut | None:
@@ -228,7 +279,15 @@ def _offer_out(state: SessionState) -> OfferOut | None:
         snap_id=offer.snap_id,
         T_world_object=offer.T_world_object.tolist(),
         confidence=offer.confidence,
+        quiet=offer.quiet,
     )
+
+
+def _live_out(state: SessionState) -> LiveOut | None:
+    live = state.live
+    if live is None:
+        return None
+    return LiveOut(T_world_object=live.T_world_object.tolist(), confidence=live.confidence)
 
 
 def _event_out(row: Event) -> EventOut:

@@ -21,6 +21,7 @@ SnapState = Literal["queued", "running", "done", "cancelled", "failed"]
 OUTCOMES: dict[str, SnapState] = {
     "snap_applied": "done",
     "snap_offered": "done",
+    "accept": "done",  # of a live one, which is written down only then
     "snap_cancelled": "cancelled",
     "snap_failed": "failed",
 }

@@ -24,14 +24,13 @@ from app.api.registrations import RegistrationOut, registration_out
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose
-from app.tables import Frame, Object, Registration, Scene, Task
+from app.tables import Condition, Frame, Object, Registration, Scene, Task
 from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 
 TaskState = Literal["open", "in_progress", "submitted"]
 Mode = Literal["accurate", "quick"]
-Condition = Literal["manual", "snap", "auto"]
 
 
 class NewTask(BaseModel):

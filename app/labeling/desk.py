@@ -5,6 +5,8 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import product
+from typing import cast
 
 import numpy as np
 from sqlalchemy import select
@@ -14,22 +16,29 @@ from app import __version__
 from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog, NewEvent
+from app.labeling.chair import Chair
 from app.labeling.history import replay
+from app.labeling.machine import SamePose
 from app.labeling.session import LabelingSession, SessionState
-from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from app.memory import give_back
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
-from app.tables import EstimateRow, Frame, Registration, Scene, Task
+from app.tables import Condition, EstimateRow, Frame, Registration, Scene, Task
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, pose
+from registration_core.pose_error import mssd
 from registration_core.problem import region_of_interest
 
 logger = logging.getLogger(__name__)
 
 IDLE_SECONDS = 30 * 60
 """A session that nobody looks at and nobody used for so long is closed; its log brings it back."""
+
+
+LIVE_PRIORITY = -1
+"""Where workers have to choose, they do what somebody waits for first."""
 
 
 class NotFoundError(Exception):
@@ -47,6 +56,7 @@ class Seat:
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
+    chair: Chair = field(default_factory=Chair)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
@@ -190,6 +200,8 @@ class Desk:
             frame_id=frame_id,
             frame_ids=tuple(frames),
             pivot=model.centre,
+            condition=cast(Condition, task.condition),
+            same_pose=_same_pose_of(model),
             record_event=record_event,
             request_snap=request_snap,
         )
@@ -217,7 +229,8 @@ class Desk:
         except ValueError as error:
             on_end(SnapFailure(f"The snap cannot work on this: {error}."))
             return lambda: None
-        return self._snapper.request(job, model, on_progress, ended)
+        priority = LIVE_PRIORITY if order.is_live else 0
+        return self._snapper.request(job, model, on_progress, ended, priority)
 
     def _job(
         self, frame: Frame, model: ObjectModel, order: SnapOrder, T_camera_object: np.ndarray
@@ -230,7 +243,7 @@ class Desk:
             left, top, depth = 0, 0, whole
         return SnapJob(
             snap_id=order.snap_id,
-            topic=self._snapper.topic,
+            topic="" if order.is_live else self._snapper.topic,
             model_hash=model.content_hash,
             depth=np.ascontiguousarray(depth),
             camera=camera.cropped(left, top, depth.shape[1], depth.shape[0]),
@@ -268,6 +281,7 @@ class _Shown:
         self._data = data
         self._frames = frames
         self._frame_id: int | None = None
+        self._ghost: Offer | None = None
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -276,6 +290,10 @@ class _Shown:
             self._show_cloud(self._frames[state.frame_id])
         if not state.dragging:
             self._view.move_object(state.T_world_object, state.gizmo_axes)
+        ghost = state.live or state.offer
+        if ghost is not self._ghost:
+            self._ghost = ghost
+            self._view.show_ghost(ghost.T_world_object if ghost else None)
         if state.state != "open":
             self._view.lock_object()
 
@@ -284,6 +302,17 @@ class _Shown:
         distance = np.linalg.norm(cloud.points - np.array(frame.T_world_camera)[:3, 3], axis=1)
         footprint = float(np.median(distance)) / frame.fx if len(distance) else 0.001
         self._view.show_cloud(cloud.points, cloud.colors, point_size=footprint)
+
+
+def _same_pose_of(model: ObjectModel) -> SamePose:
+    """Two poses are the same where a snap's confidence calls both right: an MSSD of 5 % of the diameter."""
+    sides = zip(model.vertices.min(axis=0), model.vertices.max(axis=0), strict=True)
+    corners = np.array(list(product(*sides)))
+
+    def same(T_a: np.ndarray, T_b: np.ndarray) -> bool:
+        return mssd(T_a, T_b, corners, model.symmetry_transforms) < 0.05 * model.diameter
+
+    return same
 
 
 def _close(seat: Seat) -> None:

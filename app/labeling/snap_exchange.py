@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.auth import Actor
 from app.labeling.start_spread import StartSpread
 from app.tables import EstimateRow
 from registration_core import Estimate, SnapConfig
@@ -25,6 +26,8 @@ class SnapOrder:
     seed: int
     start_spread: StartSpread | None
     """How far off the pose may be; None where that is unknown."""
+    is_live: bool = False
+    """Nobody waits for it: others go first, and its progress is of no interest."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +63,7 @@ class SnapStatus:
     """How the last snap stands."""
 
     id: str
+    asked_by: Actor
     state: str = "queued"
     """queued, running, done, cancelled or failed."""
     progress: float = 0.0
@@ -73,11 +77,13 @@ class SnapStatus:
 
 @dataclass(frozen=True)
 class Offer:
-    """An estimate that waits for the operator's word, since the object was moved meanwhile."""
+    """An estimate that waits for the operator's word."""
 
     snap_id: str
     T_world_object: Array
     confidence: float
+    quiet: bool = False
+    """Nobody asked for it: it is there to be taken, and asks for no answer."""
 
 
 def stored_spread(spread: StartSpread | None) -> list[float] | None:

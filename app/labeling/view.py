@@ -18,7 +18,12 @@ Array = NDArray[np.float64]
 
 HUMAN_COLOR = (255, 149, 64)
 """Of what the operator holds; the same in the pages' style sheet."""
+MACHINE_COLOR = (108, 192, 255)
+"""Of what the machine shows; the same in the pages' style sheet."""
 MESH_OPACITY = 0.55
+GHOST_OPACITY = 0.6
+GHOST_SIZE = 1.03
+"""Times the object's own, since measured points would hide a ghost that lies where it should."""
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
 STEP_BACK = 1.15
@@ -55,7 +60,6 @@ class SceneView:
     def __init__(
         self, model: ObjectModel, T_world_object: Array, first_view: FirstView, drag: DragHandlers
     ) -> None:
-        self._pivot = model.centre
         self._T_gizmo_object = pose.from_rotation_translation(np.eye(3), -model.centre)
         self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         _refuse_sharing(self._server)
@@ -64,7 +68,9 @@ class SceneView:
         )
         self._server.scene.set_background_image(np.full((1, 1, 3), BACKGROUND, dtype=np.uint8))
         self._place_camera(first_view)
-        self._gizmo, self._mesh = self._add_object(model, T_world_object)
+        self._model = model
+        self._ghost: viser.MeshHandle | None = None
+        self._gizmo, self._mesh = self._add_object(T_world_object)
         self._follow_drags(drag)
 
     @property
@@ -85,7 +91,9 @@ class SceneView:
         and the mesh, which hangs on it, the rotation that the gizmo had gathered.
         """
         rotation = T_world_object[:3, :3] if gizmo_axes == "object" else np.eye(3)
-        T_world_gizmo = pose.from_rotation_translation(rotation, pose.apply(T_world_object, self._pivot))
+        T_world_gizmo = pose.from_rotation_translation(
+            rotation, pose.apply(T_world_object, self._model.centre)
+        )
         self._T_gizmo_object = pose.inverse(T_world_gizmo) @ T_world_object
         with self._server.atomic():
             self._gizmo.position, self._gizmo.wxyz = _to_viser(T_world_gizmo)
@@ -114,6 +122,21 @@ class SceneView:
                 client.camera.position = viewpoint.position
                 client.camera.look_at = viewpoint.target
 
+    def show_ghost(self, T_world_object: Array | None) -> None:
+        """Show where the machine would put the object; None shows nothing."""
+        if T_world_object is None:
+            if self._ghost is not None:
+                self._ghost.visible = False
+            return
+        if self._ghost is None:
+            self._ghost = self._add_mesh("/ghost", MACHINE_COLOR, GHOST_OPACITY, GHOST_SIZE)
+        centre = pose.apply(T_world_object, self._model.centre)
+        position, wxyz = _to_viser(pose.from_rotation_translation(T_world_object[:3, :3], centre))
+        with self._server.atomic():
+            self._ghost.position = position
+            self._ghost.wxyz = wxyz
+            self._ghost.visible = True
+
     def lock_object(self) -> None:
         """Take the gizmo's handles away; the object stays in view."""
         with self._server.atomic():
@@ -136,29 +159,31 @@ class SceneView:
         camera.up = up
         camera.fov = float(np.clip(view.field_of_view, *FIELD_OF_VIEW_LIMITS))
 
-    def _add_object(
-        self, model: ObjectModel, T_world_object: Array
-    ) -> tuple[viser.TransformControlsHandle, viser.MeshHandle]:
+    def _add_object(self, T_world_object: Array) -> tuple[viser.TransformControlsHandle, viser.MeshHandle]:
         position, wxyz = _to_viser(T_world_object @ pose.inverse(self._T_gizmo_object))
         gizmo = self._server.scene.add_transform_controls(
             "/object",
-            scale=GIZMO_SIZE * model.diameter,
+            scale=GIZMO_SIZE * self._model.diameter,
             line_width=3.0,
             depth_test=False,
             position=position,
             wxyz=wxyz,
         )
-        mesh = self._server.scene.add_mesh_simple(
-            "/object/mesh",
-            vertices=(model.vertices - model.centre).astype(np.float32),
-            faces=model.faces,
-            color=HUMAN_COLOR,
-            opacity=MESH_OPACITY,
+        return gizmo, self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
+
+    def _add_mesh(
+        self, name: str, color: tuple[int, int, int], opacity: float, size: float = 1.0
+    ) -> viser.MeshHandle:
+        return self._server.scene.add_mesh_simple(
+            name,
+            vertices=(size * (self._model.vertices - self._model.centre)).astype(np.float32),
+            faces=self._model.faces,
+            color=color,
+            opacity=opacity,
             side="double",
             cast_shadow=False,
             receive_shadow=False,
         )
-        return gizmo, mesh
 
     def _follow_drags(self, drag: DragHandlers) -> None:
         @self._gizmo.on_update

@@ -1,14 +1,20 @@
 /** The keyboard overlay, written from the bindings themselves. */
 
 import { byId, element } from "../dom.js";
+import { MOD } from "./keys.js";
 
-const SHOWN = { Mod: /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl", Escape: "Esc" };
+const SHOWN = { Mod: MOD, Escape: "Esc" };
 
-/** Fills the overlay with {keys, does, caps?}, `caps` standing for many keys; returns the function that opens it. */
+/**
+ * Fills the overlay with {keys, does, caps?, machine?}, `caps` standing for many keys; returns the function
+ * that opens it.
+ */
 export function setUpHelp(bindings) {
-  const rows = bindings.map(({ keys, does, caps }) =>
-    element("div", {}, element("dt", {}, ...(caps ? joinedCaps(caps) : keyCaps(keys))), element("dd", {}, does)),
-  );
+  const rows = bindings.map(({ keys, does, caps, machine }) => {
+    const props = machine ? { "data-machine": "" } : {};
+    const shown = caps ? joinedCaps(caps) : keyCaps(keys);
+    return element("div", props, element("dt", {}, ...shown), element("dd", {}, does));
+  });
   byId("key-list").replaceChildren(...rows);
   const open = () => byId("keys").showModal();
   byId("help").addEventListener("click", open);

@@ -1,5 +1,8 @@
 /** Keys that work wherever the focus is, in this page and in the iframe of the 3-D view. */
 
+/** How the Ctrl or Cmd key is called here. */
+export const MOD = /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl";
+
 /**
  * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}; `run` is handed the key.
  *

@@ -13,6 +13,7 @@ import { messageArea } from "../message.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
+import { machinePart } from "./machine.js";
 import { showNext } from "./next.js";
 import { numbersPart } from "./numbers.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
@@ -36,8 +37,16 @@ const page = {
   registration: () => registration,
   isConnected: () => connected,
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
+  act,
 };
-const PARTS = [imagePart(page), numbersPart(page), placePart(page), precisionPart(page), viewsPart(page)];
+const PARTS = [
+  imagePart(page),
+  machinePart(page),
+  numbersPart(page),
+  placePart(page),
+  precisionPart(page),
+  viewsPart(page),
+];
 
 const ACTIONS = {
   snap: requestSnap,
@@ -51,10 +60,10 @@ const ACTIONS = {
 };
 
 const BINDINGS = [
-  { keys: ["Space"], does: "Snap", run: () => act("snap") },
+  { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
   { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
-  { keys: ["Y"], does: "Accept the machine's offer", run: () => act("offer-accept") },
-  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss") },
+  { keys: ["Y"], does: "Accept the machine's offer or ghost", run: () => act("offer-accept"), machine: true },
+  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
   { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
   ...PARTS.flatMap((part) => part.bindings ?? []),
@@ -132,6 +141,7 @@ function show(received) {
 
 function reportSnap(before, snap) {
   if (!snap || (before?.id === snap.id && before?.state === snap.state)) return;
+  if (snap.asked_by === "machine") return;
   if (snap.state !== "failed") message.clear();
   else message.show(snap.message, "problem", { label: "Try again", run: () => act("snap") });
 }
@@ -158,7 +168,7 @@ async function act(name) {
 async function requestSnap() {
   const before = registration.snap;
   snapRequest = post(path("snaps"), {});
-  show({ ...registration, snap: { id: null, state: "queued", progress: 0, message: null } });
+  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null } });
   try {
     await snapRequest;
   } catch (error) {
@@ -206,6 +216,7 @@ function showClosed(title, text, retry) {
   byId("opening").hidden = true;
   byId("connection").hidden = true;
   byId("offer").hidden = true;
+  byId("note").hidden = true;
   setText(byId("closed-title"), title);
   setText(byId("closed-text"), text);
   setText(byId("closed-retry"), retry);

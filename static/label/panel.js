@@ -10,6 +10,13 @@ const SNAP_STATUS = {
   failed: "The snap failed.",
 };
 
+const UNASKED = {
+  queued: "The machine looks…",
+  running: "The machine looks…",
+  cancelled: "",
+  failed: "The machine finds nothing from here.",
+};
+
 export function isSnapping({ snap }) {
   return snap?.state === "queued" || snap?.state === "running";
 }
@@ -17,14 +24,17 @@ export function isSnapping({ snap }) {
 /** What can be done now, by action. */
 export function possible(registration, connected) {
   const open = registration?.state === "open" && connected;
+  const machine = open && registration.condition !== "manual";
+  const shown = registration?.offer ?? registration?.live ?? null;
   return {
-    snap: open,
+    snap: machine,
+    live: machine,
     cancel: open && isSnapping(registration),
     undo: open && registration.can_undo,
     redo: open && registration.can_redo,
     reset: open && registration.can_undo,
     submit: open && !isSnapping(registration) && !registration.dragging,
-    "offer-accept": open && registration.offer !== null,
+    "offer-accept": open && shown !== null,
     "offer-dismiss": open && registration.offer !== null,
   };
 }
@@ -74,12 +84,13 @@ function drawSnap(registration) {
 
 function snapStatus({ state, snap, offer, confidence }) {
   if (!snap || state !== "open") return "";
-  if (snap.state !== "done") return SNAP_STATUS[snap.state];
+  if (snap.state !== "done") return snap.asked_by === "machine" ? UNASKED[snap.state] : SNAP_STATUS[snap.state];
+  if (offer?.quiet) return "";
   if (offer) return "You moved the object meanwhile: the result is offered.";
   return confidence === null ? "" : `Snapped, confidence ${confidence.toFixed(2)}.`;
 }
 
 function drawOffer({ offer, state }) {
-  byId("offer").hidden = !offer || state !== "open";
+  byId("offer").hidden = !offer || offer.quiet || state !== "open";
   if (offer) setText(byId("offer-confidence"), offer.confidence.toFixed(2));
 }

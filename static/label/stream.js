@@ -3,6 +3,8 @@
 import { ApiError } from "../api.js";
 
 const RETRY_MS = 1000;
+/** Tells this page from others of the same registration: the newest takes over. */
+const PAGE = crypto.getRandomValues(new Uint32Array(4)).join("-").slice(0, 40);
 
 /**
  * Follows a registration. `resume` is awaited before each reconnect: it checks the login and starts the view
@@ -11,7 +13,7 @@ const RETRY_MS = 1000;
  */
 export function followRegistration(id, { resume, onRegistration, onLost, onTakenOver, onRefused }) {
   function connect() {
-    const source = new EventSource(`/api/registrations/${id}/stream`);
+    const source = new EventSource(`/api/registrations/${id}/stream?page=${PAGE}`);
     source.addEventListener("registration", (event) => onRegistration(JSON.parse(event.data)));
     source.addEventListener("taken_over", () => {
       source.close();

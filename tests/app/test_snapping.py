@@ -159,6 +159,31 @@ def test_cancelling_one_of_many_lets_the_next_begin(snapper, model):
     wait_until(lambda: busy(snapper) == 0, "the workers to stop")
 
 
+def test_of_those_that_wait_the_urgent_goes_first(snapper, model):
+    running = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
+    assert all(outcome.moved.wait(LONGEST) for outcome, _ in running)
+    order: list[str] = []
+    told = Outcome()
+
+    def note(name: str) -> Callable[[JobResult | SnapError], None]:
+        def on_end(outcome: JobResult | SnapError) -> None:
+            order.append(name)
+            if len(order) == 2:
+                told.on_end(outcome)
+
+        return on_end
+
+    for name, priority in (("live", -1), ("asked for", 0)):
+        job = new_job(model)
+        snapper.request(job, model, told.on_progress, note(name), priority)
+        wait_until(lambda job=job: snapper._pending[job.snap_id].future, "the snap to be handed over")
+    running[0][1]()
+    assert isinstance(result_of(told), JobResult)
+    running[1][1]()
+    assert order == ["asked for", "live"] and told.shares == []
+    wait_until(lambda: busy(snapper) == 0, "the workers to stop")
+
+
 def test_an_object_that_no_worker_knows_is_sent_along(snapper):
     unknown = new_model()
     assert knowing(snapper, unknown.content_hash) == 0

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.tables import Condition
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, drag, view_frame
 from tests.processes import Server, command_line, descendants, serving
@@ -26,13 +27,22 @@ NEXT_PICTURE = "() => new Promise(done => requestAnimationFrame(() => requestAni
 class Desk:
     """A labelling page and the registration behind it."""
 
-    def __init__(self, page: Page, server: Server, object_name: str = "") -> None:
-        """Open the first task that nobody has, or that of an object in the first demo scene."""
+    def __init__(
+        self, page: Page, server: Server, object_name: str = "", condition: Condition | None = None
+    ) -> None:
+        """Open the first task that nobody has, or that of an object in the first demo scene.
+
+        With a condition it is a new task under this one, which only an administrator may ask for.
+        """
         self.page = page
         page.wait_for_url(f"{server.url}/")
         wanted = "scene_id=1" if object_name else "state=open"
         tasks = page.request.get(f"{server.url}/api/tasks?{wanted}").json()["items"]
         self.task = next(task for task in tasks if object_name in task["object"]["name"])
+        if condition is not None:
+            scene_id, object_id = self.task["scene"]["id"], self.task["object"]["id"]
+            wanted_task = {"scene_id": scene_id, "object_id": object_id, "condition": condition}
+            self.task = page.request.post(f"{server.url}/api/tasks", data=wanted_task).json()
         self.page_url = f"{server.url}/label/{self.task['id']}"
         page.goto(self.page_url)
         self.frame = view_frame(page)

@@ -328,7 +328,27 @@ def test_a_stream_keeps_its_session_until_it_is_left(live: LiveServer, script: h
     registration = begin(script, 1)
     seat = seat_of(live, registration)
     with script.stream("GET", f"{url_of(registration)}/stream") as answer:
-        next(messages(answer))
+        told = messages(answer)  # kept: a generator that is thrown away closes the stream
+        next(told)
         assert seat.watchers == 1
     wait_until(lambda: seat.watchers == 0, "the stream to be left")
     seat.session.set_pose(true_pose(TOOL), Actor.SCRIPT)
+
+
+def test_a_newer_page_takes_over_and_the_older_says_so(
+    script: httpx.Client, registration: dict[str, Any]
+) -> None:
+    url = f"{url_of(registration)}/stream"
+    with script.stream("GET", url, params={"page": "older"}) as older, script.stream("GET", url) as watching:
+        lines = older.iter_lines()
+        assert "event: registration" in itertools.takewhile(bool, lines)
+        watched = messages(watching)
+        assert next(watched) == registration
+        with script.stream("GET", url, params={"page": "newer"}) as newer:
+            told = messages(newer)
+            assert next(told) == registration
+            ending = list(lines)
+            assert "event: taken_over" in ending and "event: registration" not in ending
+            changed = put_pose(script, registration, true_pose(TOOL)).json()
+            assert next(told) == changed
+            assert next(watched) == changed

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.auth import Actor, Identity, Role
-from app.labeling.desk import NotFoundError, Seat
+from app.labeling.desk import NotFoundError, Seat, _same_pose_of
 from app.services import Services
 from registration_core import SnapConfig, pose
 from registration_core.pose_error import adi
@@ -178,6 +178,28 @@ def test_the_view_is_made_once_and_goes_with_the_session(services, seat, ann):
     again = services.desk.seat(seat.registration.id, ann)
     with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(again)}/") as client:
         client.node("MeshMessage", "/object/mesh")
+
+
+def test_the_view_shows_the_ghost_of_what_is_live_until_it_is_taken(services, seat):
+    near = pose.perturbed(true_pose(TOOL), 0.012, np.radians(10), np.random.default_rng(3))
+    with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(seat)}/") as client:
+        seat.session.set_pose(near, Actor.HUMAN)
+        seat.session.set_live(True, Actor.HUMAN)
+        live = wait_until(lambda: seat.session.snapshot().live, "a live result")
+        centre = pose.apply(live.T_world_object, seat.model.centre)
+        client.wait_for(
+            "SetPositionMessage",
+            lambda m: m["name"] == "/ghost" and np.allclose(m["position"], centre, atol=1e-5),
+        )
+        seat.session.accept(Actor.HUMAN)
+        client.wait_for("SetSceneNodeVisibilityMessage", lambda m: m["name"] == "/ghost" and not m["visible"])
+
+
+def test_two_poses_are_the_same_where_both_would_be_called_right(seat):
+    same = _same_pose_of(seat.model)
+    for share, expected in ((0.04, True), (0.06, False)):
+        moved = true_pose(TOOL) @ pose.exp([share * seat.model.diameter, 0, 0, 0, 0, 0])
+        assert same(moved, true_pose(TOOL)) is expected
 
 
 def test_the_view_follows_the_session_and_the_session_the_view(services, seat):

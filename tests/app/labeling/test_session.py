@@ -9,9 +9,10 @@ import pytest
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import History, Step
-from app.labeling.session import ActionError, LabelingSession, SessionState
+from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
-from app.tables import EstimateRow
+from app.labeling.track import ActionError
+from app.tables import Condition, EstimateRow
 from registration_core import Ambiguity, Estimate, Hypothesis, SnapConfig, pose
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
@@ -95,7 +96,7 @@ def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
 class Bench:
     """A session between a log and workers."""
 
-    def __init__(self, state: str = "open") -> None:
+    def __init__(self, state: str = "open", condition: Condition = "snap") -> None:
         self.log = Log()
         self.workers = Workers()
         self.session = LabelingSession(
@@ -105,6 +106,8 @@ class Bench:
             frame_id=FRAMES[0],
             frame_ids=FRAMES,
             pivot=PIVOT,
+            condition=condition,
+            same_pose=lambda a, b: bool(np.allclose(a, b, atol=0.005)),
             record_event=self.log,
             request_snap=self.workers,
         )
@@ -224,6 +227,7 @@ ACTIONS: dict[str, Callable[[LabelingSession], object]] = {
     "redo": lambda session: session.redo(Actor.HUMAN),
     "frame": lambda session: session.show_frame(FRAMES[1], Actor.HUMAN),
     "snap_requested": lambda session: session.snap(Actor.HUMAN),
+    "live": lambda session: session.set_live(True, Actor.HUMAN),
     "accept": lambda session: session.accept(Actor.HUMAN),
     "dismiss": lambda session: session.dismiss(Actor.HUMAN),
     "submit": lambda session: session.submit(Actor.HUMAN),

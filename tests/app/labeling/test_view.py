@@ -101,6 +101,32 @@ def test_the_cloud_arrives_in_full_precision_and_is_replaced(view):
         client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
 
 
+def visible(client: ViserClient, shown: bool) -> None:
+    client.wait_for(
+        "SetSceneNodeVisibilityMessage", lambda m: m["name"] == "/ghost" and m["visible"] is shown
+    )
+
+
+def test_a_ghost_comes_moves_and_goes(view, model):
+    with connect(view) as client:
+        view.show_ghost(None)
+        for T in (T_WORLD_OBJECT, T_WORLD_OBJECT @ pose.exp([0.05, 0, 0, 0, 0, 0.3])):
+            view.show_ghost(T)
+            centre = pose.apply(T, model.centre)
+            client.wait_for(
+                "SetPositionMessage",
+                lambda m, at=centre: m["name"] == "/ghost" and np.allclose(m["position"], at, atol=1e-6),
+            )
+        ghost = client.node("MeshMessage", "/ghost")["props"]
+        mesh = client.node("MeshMessage", "/object/mesh")["props"]
+        assert ghost["color"] != mesh["color"] and 0 < ghost["opacity"] < 1
+        assert ghost["vertices"] == pytest.approx(1.03 * mesh["vertices"], rel=1e-5)
+        view.show_ghost(None)
+        visible(client, False)
+    with connect(view) as again:
+        visible(again, False)
+
+
 def test_a_reloaded_page_sees_where_the_object_is_now(view, model):
     moved = T_WORLD_OBJECT @ pose.exp([0.05, 0, 0, 0, 0, 0.3])
     view.move_object(moved)

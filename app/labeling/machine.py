@@ -1,0 +1,261 @@
+"""The machine's hand on the object: the snaps it was asked for, what they brought, and what it offers."""
+
+import secrets
+import uuid
+from collections.abc import Callable
+from dataclasses import replace
+
+from app.auth import Actor
+from app.event_log import NewEvent
+from app.labeling.history import Step
+from app.labeling.live_snap import LiveSnap
+from app.labeling.snap_exchange import (
+    Offer,
+    RequestSnap,
+    SnapFailure,
+    SnapOrder,
+    SnapResult,
+    SnapStatus,
+    estimate_row,
+    stored_spread,
+)
+from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
+from app.labeling.track import ActionError, Array, Track
+from app.tables import Condition
+from registration_core import SnapConfig
+
+TAKE_OVER_CONFIDENCE = 0.9
+"""From here on the machine puts the object by itself, in `auto`. Confidence is calibrated: of ten poses that
+it takes over at least nine are right, and the tenth costs the operator one key."""
+
+LIVE_SEED = 0
+"""Always the same, so that the ghost of an object that rests does so, too."""
+
+SamePose = Callable[[Array, Array], bool]
+"""Whether two poses T_world_object are one and the same, as far as anybody could tell."""
+
+
+class Machine:
+    """One at a time, please: the session that owns it lets nobody in while somebody else is.
+
+    Args:
+        registration_id: Whose estimates these are.
+        track: The object's way, which results are put on.
+        condition: What the machine may do in this task.
+        same_pose: Tells whether the operator has seen a result before.
+        request_snap: Hands an order to the workers.
+    """
+
+    def __init__(
+        self,
+        registration_id: int,
+        track: Track,
+        condition: Condition,
+        same_pose: SamePose,
+        request_snap: RequestSnap,
+    ) -> None:
+        self._registration_id = registration_id
+        self._track = track
+        self._condition = condition
+        self._same_pose = same_pose
+        self._request_snap = request_snap
+        self._cancel: Callable[[], None] | None = None
+        self._live = LiveSnap(request_snap)
+        self._taken_over: list[Array] = []
+        """Poses that the machine put the object at by itself."""
+        self.status: SnapStatus | None = None
+        """Of the last snap."""
+        self.offer: Offer | None = None
+
+    def snap(
+        self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
+    ) -> str:
+        """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
+        self._require_machine()
+        self.abandon(actor, "superseded")
+        order = self._order(config, seed, start_spread)
+        self._track.record(
+            NewEvent(
+                kind="snap_requested",
+                actor=actor,
+                T_before=order.T_world_object.tolist(),
+                snap_id=order.snap_id,
+                detail={
+                    "seed": order.seed,
+                    "config": order.config.to_dict(),
+                    "start_spread": stored_spread(order.start_spread),
+                    "frame_id": order.frame_id,
+                },
+            )
+        )
+        self.status = SnapStatus(order.snap_id, actor)
+        self.offer = None
+        self._track.message = None
+        then = self._track.history.current
+        self._cancel = self._request_snap(
+            order,
+            lambda share: self._progressed(order.snap_id, share),
+            lambda outcome: self._ended(order, then, outcome),
+        )
+        return order.snap_id
+
+    @property
+    def is_live(self) -> bool:
+        """Whether live snapping is on."""
+        return self._live.is_on
+
+    @property
+    def live(self) -> Offer | None:
+        """Where a snap would land."""
+        return self._live.found.offer if self._live.found else None
+
+    def set_live(self, on: bool, actor: Actor) -> None:
+        """Turn live snapping on or off."""
+        if on == self._live.is_on:
+            return
+        self._require_machine()
+        self._track.record(NewEvent(kind="live", actor=actor, detail={"on": on}))
+        self._live.is_on = on
+
+    def follow(self, is_open: bool) -> None:
+        """Let live snapping keep up with what changed. A pose that the machine found needs no ghost."""
+        track = self._track
+        if self.live is not None:
+            self.offer = None  # one pose at a time, the newest
+        snapping = self.status is not None and self.status.is_live
+        by_hand = track.drag is not None or track.history.current.confidence is None
+        offered = self.offer is not None and track.drag is None
+        if self.is_live and is_open and by_hand and not snapping and not offered:
+            self._live.follow(track.T_world_object, track.frame_id, self._live_order)
+        else:
+            self._live.rest()
+
+    def take_turn(self) -> None:
+        """The operator has let go of the object: in `auto`, snap without being asked."""
+        if self._condition == "auto":
+            self.snap(Actor.MACHINE, SnapConfig(), None, Unsaid.FROM_DRAGS)
+
+    def abandon(self, actor: Actor, reason: str) -> None:
+        """Stop the snap that is under way; nothing happens where there is none."""
+        if self.status is None or not self.status.is_live:
+            return
+        assert self._cancel is not None
+        self._track.record(
+            NewEvent(kind="snap_cancelled", actor=actor, snap_id=self.status.id, detail={"reason": reason})
+        )
+        self._cancel()
+        self.status = replace(self.status, state="cancelled")
+
+    def close(self) -> None:
+        """Stop whatever is under way, for good."""
+        self.abandon(Actor.MACHINE, "session closed")
+        self._live.is_on = False
+        self._live.rest()
+
+    def accept(self, actor: Actor) -> None:
+        """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
+        look = self._live.found
+        offer = look.offer if look else self._require_offer()
+        step = Step(offer.T_world_object, offer.confidence)
+        event = self._track.move_event("accept", actor, step, offer.snap_id)
+        row = estimate_row(self._registration_id, look.order, look.result) if look else None
+        self._track.push(event, step, row)
+        self.offer = None
+        self._live.rest()
+
+    def dismiss(self, actor: Actor) -> None:
+        """Decline the pose that is offered."""
+        offer = self._require_offer()
+        self._track.record(NewEvent(kind="dismiss", actor=actor, snap_id=offer.snap_id))
+        self.offer = None
+
+    def _live_order(self) -> SnapOrder:
+        return replace(self._order(SnapConfig(), LIVE_SEED, Unsaid.FROM_DRAGS), is_live=True)
+
+    def _order(
+        self, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
+    ) -> SnapOrder:
+        history = self._track.as_if_let_go
+        if start_spread is Unsaid.FROM_DRAGS:
+            start_spread = spread_from_drags(history, self._track.pivot, config.spread)
+        return SnapOrder(
+            snap_id=uuid.uuid4().hex,
+            frame_id=self._track.frame_id,
+            T_world_object=history.current.T_world_object,
+            config=config,
+            seed=secrets.randbelow(2**31) if seed is None else seed,
+            start_spread=start_spread,
+        )
+
+    def _progressed(self, snap_id: str, share: float) -> None:
+        if self._is_current(snap_id):
+            assert self.status is not None
+            progress = max(self.status.progress, min(1.0, share))
+            self.status = replace(self.status, state="running", progress=progress)
+
+    def _ended(self, order: SnapOrder, then: Step, outcome: SnapResult | SnapFailure) -> None:
+        if not self._is_current(order.snap_id):
+            return
+        assert self.status is not None
+        try:
+            if isinstance(outcome, SnapFailure):
+                self._fail(order, str(outcome))
+            else:
+                self._take(order, then, outcome)
+        except Exception as error:
+            message = f"The result could not be saved: {error}"
+            self.status = replace(self.status, state="failed", message=message)
+            raise
+
+    def _take(self, order: SnapOrder, then: Step, result: SnapResult) -> None:
+        assert self.status is not None
+        estimate, unasked = result.estimate, self.status.asked_by is Actor.MACHINE
+        moved = self._track.drag is not None or self._track.history.current is not then
+        applied = not moved and (not unasked or self._may_take_over(result))
+        event = NewEvent(
+            kind="snap_applied" if applied else "snap_offered",
+            actor=Actor.MACHINE,
+            T_before=order.T_world_object.tolist(),
+            T_after=result.T_world_object.tolist(),
+            snap_id=order.snap_id,
+            duration_seconds=estimate.seconds,
+            detail={"confidence": estimate.confidence}
+            | ({"threshold": TAKE_OVER_CONFIDENCE} if unasked else {}),
+        )
+        row = estimate_row(self._registration_id, order, result)
+        if applied:
+            self._track.push(event, Step(result.T_world_object, estimate.confidence), row)
+            self._taken_over += [result.T_world_object] if unasked else []
+        else:
+            self._track.record(event, row)
+            self.offer = Offer(order.snap_id, result.T_world_object, estimate.confidence, quiet=unasked)
+        self.status = replace(self.status, state="done", progress=1.0)
+
+    def _may_take_over(self, result: SnapResult) -> bool:
+        # What the operator took back, by undo or by dragging on, is not forced on them again.
+        taken_back = any(self._same_pose(result.T_world_object, T) for T in self._taken_over)
+        return result.estimate.confidence >= TAKE_OVER_CONFIDENCE and not taken_back
+
+    def _fail(self, order: SnapOrder, message: str) -> None:
+        assert self.status is not None
+        self._track.record(
+            NewEvent(
+                kind="snap_failed",
+                actor=Actor.MACHINE,
+                snap_id=order.snap_id,
+                detail={"message": message},
+            )
+        )
+        self.status = replace(self.status, state="failed", message=message)
+
+    def _is_current(self, snap_id: str) -> bool:
+        return self.status is not None and self.status.id == snap_id and self.status.is_live
+
+    def _require_machine(self) -> None:
+        if self._condition == "manual":
+            raise ActionError("This task is done by hand alone: there is no machine to help.")
+
+    def _require_offer(self) -> Offer:
+        if self.offer is None:
+            raise ActionError("The machine offers no pose at present.")
+        return self.offer

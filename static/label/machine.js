@@ -1,0 +1,80 @@
+/**
+ * What the machine does of its own accord: live snapping, taking over in `auto`, and what it suggests quietly.
+ * In `manual` there is no machine: whatever is marked `data-machine` is put away.
+ */
+
+import { put } from "../api.js";
+import { byId, setText } from "../dom.js";
+import { MOD } from "./keys.js";
+import { possible } from "./panel.js";
+
+const REMEMBERED = "snap6d.live";
+
+/** A part of the labelling page. */
+export function machinePart(page) {
+  let switching = false;
+  byId("live").addEventListener("click", toggle);
+  byId("note-accept").addEventListener("click", () => page.act("offer-accept"));
+  byId("note-undo").addEventListener("click", () => page.act("undo"));
+  setText(byId("note-undo-key"), `${MOD} Z`);
+
+  const isWanted = () => localStorage.getItem(REMEMBERED) === "on";
+  const isPossible = (registration) => possible(registration, page.isConnected()).live;
+
+  function open(task) {
+    document.body.dataset.condition = task.condition;
+  }
+
+  function draw(registration, before) {
+    const { is_live: isLive } = registration;
+    byId("live").setAttribute("aria-pressed", isLive);
+    drawNote(noteFor(registration));
+    const fresh = !before || (before.is_live && !isLive); // the page, or the server, has just come up
+    if (fresh && isWanted() && !isLive && isPossible(registration)) change(true);
+  }
+
+  function toggle() {
+    const registration = page.registration();
+    if (!isPossible(registration)) return;
+    localStorage.setItem(REMEMBERED, registration.is_live ? "off" : "on");
+    change(!registration.is_live);
+  }
+
+  async function change(on) {
+    if (switching) return;
+    switching = true;
+    await put(page.path("live"), { on }).catch(page.message.problem);
+    switching = false;
+  }
+
+  const bindings = [
+    { keys: ["V"], does: "Live on or off: a ghost shows where a snap would land", run: toggle, machine: true },
+  ];
+  return { bindings, open, draw };
+}
+
+/** What there is to say in the view: {kind, text, confidence}, or null. */
+function noteFor({ state, offer, live, snap, confidence, dragging }) {
+  if (state !== "open") return null;
+  if (live) return { kind: "live", text: "A snap would land at the ghost", confidence: live.confidence };
+  if (offer) {
+    const text = "The machine suggests the ghost";
+    return offer.quiet ? { kind: "suggested", text, confidence: offer.confidence } : null;
+  }
+  const tookOver = snap?.state === "done" && snap.asked_by === "machine";
+  if (!tookOver || confidence === null || dragging) return null;
+  return { kind: "taken", text: "The machine took over", confidence };
+}
+
+function drawNote(note) {
+  const box = byId("note");
+  box.hidden = note === null;
+  if (note === null) return;
+  // What changes many times a second is not read out.
+  box.setAttribute("aria-live", note.kind === "live" ? "off" : "polite");
+  box.dataset.kind = note.kind;
+  setText(byId("note-text"), `${note.text}, confidence `);
+  setText(byId("note-confidence"), note.confidence.toFixed(2));
+  byId("note-accept").hidden = note.kind === "taken";
+  byId("note-undo").hidden = note.kind !== "taken";
+}

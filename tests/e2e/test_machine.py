@@ -1,0 +1,175 @@
+"""The machine as a partner: it takes over in `auto`, shows a ghost while live, and stays away in `manual`."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.labeling.machine import TAKE_OVER_CONFIDENCE
+from app.tables import Condition
+from registration_core import pose
+from tests.e2e.conftest import take_picture
+from tests.e2e.gizmo import Handle, pixel
+from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.test_readme import true_pose
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+OBJECT = "box"
+"""Of which the machine is sure."""
+GHOST_AT = """() => {
+  const node = window.__viserMutable.nodeRefFromName["/ghost"];
+  if (!node) return null;
+  for (let above = node; above; above = above.parent) if (!above.visible) return null;
+  return node.position.toArray();
+}"""
+GHOST_SHOWN = f"() => ({GHOST_AT})() !== null"
+GHOST_HIDDEN = f"() => ({GHOST_AT})() === null"
+
+GIZMO_NEAR = """T => {
+  const {x, y, z} = window.__viserMutable.nodeRefFromName["/object"].position;
+  return Math.hypot(x - T[0][3], y - T[1][3], z - T[2][3]) < 0.1;
+}"""
+"""Whether the gizmo is where an object at this pose has it, whose origin is not far."""
+
+Open = Callable[[Condition], Desk]
+
+
+@pytest.fixture
+def open_desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Open:
+    """Opens a new task under a condition, with the object roughly where it belongs."""
+
+    def open_one(condition: Condition) -> Desk:
+        name = request.node.name.replace("_", "-")[:60]
+        desk = Desk(open_page(server.new_link(name, "admin")), server, OBJECT, condition)
+        truth = true_pose(desk.task["object"]["obj_id"])
+        roughly = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
+        put = desk.page.request.put(f"{desk.url}/pose", data={"T_world_object": roughly.tolist()})
+        assert put.ok
+        expect(desk.page.locator("#undo")).to_be_enabled()
+        desk.frame.evaluate(NEXT_PICTURE)
+        return desk
+
+    return open_one
+
+
+def kinds(desk: Desk) -> list[str]:
+    items = desk.page.request.get(f"{desk.url}/events?limit=500").json()["items"]
+    return [event["kind"] for event in items]
+
+
+def hold(desk: Desk, handle: str, amount: float) -> None:
+    """Drag a handle with the mouse and keep hold of it."""
+    held = Handle(handle, desk.scale)
+    start = pixel(desk.page, desk.frame, held.grip)
+    end = pixel(desk.page, desk.frame, held.moved_grip(amount))
+    desk.page.mouse.move(*(start - 2))
+    desk.page.mouse.move(*start)
+    desk.page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    desk.page.mouse.down()
+    for step in range(1, 7):
+        desk.page.mouse.move(*(start + (end - start) * step / 6))
+
+
+def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) -> None:
+    desk = open_desk("auto")
+    page = desk.page
+    drag = desk.drag("tx", 0.01)
+    (applied,) = desk.events("snap_applied")
+    assert applied["actor"] == "machine"
+    assert applied["detail"]["confidence"] >= applied["detail"]["threshold"] == TAKE_OVER_CONFIDENCE
+    (requested,) = desk.events("snap_requested")
+    assert requested["actor"] == "machine"
+    truth = true_pose(desk.task["object"]["obj_id"])
+    assert pose.distance(desk.pose, truth).translation < 0.003
+    said = f"The machine took over, confidence {applied['detail']['confidence']:.2f}."
+    expect(page.locator("#note")).to_contain_text(said)
+    expect(page.locator("#note-undo")).to_have_text("Undo Ctrl Z")
+    take_picture(page, "label-taken-over")
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.allclose(desk.pose, drag["T_after"])
+    expect(page.locator("#note")).to_be_hidden()
+
+
+def test_what_was_taken_back_in_auto_is_only_suggested(open_desk: Open) -> None:
+    desk = open_desk("auto")
+    page = desk.page
+    desk.drag("tx", 0.01)
+    desk.events("snap_applied")
+    expect(page.locator("#note")).to_contain_text("took over")
+    desk.frame.evaluate(NEXT_PICTURE)
+    drag = desk.drag("ty", 0.01)
+    desk.events("snap_offered")
+    assert np.allclose(desk.pose, drag["T_after"])
+    expect(page.locator("#note")).to_contain_text("The machine suggests the ghost")
+    expect(page.locator("#offer")).to_be_hidden()
+    desk.frame.wait_for_function(GHOST_SHOWN)
+    take_picture(page, "label-suggested")
+    page.locator("#note-accept").click()
+    (accepted,) = desk.events("accept")
+    assert np.allclose(desk.pose, accepted["T_after"])
+    desk.frame.wait_for_function(GHOST_HIDDEN)
+
+
+def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_desk: Open) -> None:
+    desk = open_desk("snap")
+    page = desk.page
+    page.keyboard.press("v")
+    expect(page.locator("#live")).to_have_attribute("aria-pressed", "true")
+    desk.frame.wait_for_function(GHOST_SHOWN)
+    hold(desk, "tx", 0.02)
+    assert desk.state["dragging"]
+    held = desk.pose
+    expect(page.locator("#note")).to_contain_text("A snap would land at the ghost")
+    take_picture(page, "label-live")
+    page.mouse.up()
+    desk.events("drag")
+    page.keyboard.press("y")
+    (accepted,) = desk.events("accept")
+    truth = true_pose(desk.task["object"]["obj_id"])
+    assert pose.distance(desk.pose, truth).translation < 0.003 < pose.distance(held, truth).translation
+    snap = page.request.get(f"{desk.root}/api/snaps/{accepted['snap_id']}").json()
+    assert snap["state"] == "done"
+    assert np.allclose(snap["estimate"]["T_world_object"], accepted["T_after"])
+    desk.frame.wait_for_function(GHOST_HIDDEN)
+    assert "snap_requested" not in kinds(desk)
+    page.reload()
+    expect(page.locator("#live")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("v")
+    expect(page.locator("#live")).to_have_attribute("aria-pressed", "false")
+    assert [event["detail"]["on"] for event in desk.events("live")] == [True, False]
+
+
+def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_desk: Open) -> None:
+    desk = open_desk("snap")
+    page = desk.page
+    page.locator("#live").click()
+    hold(desk, "ty", 0.02)
+    expect(page.locator("#note")).to_contain_text("A snap would land at the ghost")
+    page.keyboard.press("y")
+    (accepted,) = desk.events("accept")
+    page.mouse.move(600, 300)
+    page.mouse.up()
+    desk.frame.wait_for_function(GIZMO_NEAR, arg=accepted["T_after"])
+    assert np.allclose(desk.pose, accepted["T_after"])
+    assert kinds(desk)[-2:] == ["drag", "accept"]
+
+
+def test_manual_shows_no_machine(open_desk: Open) -> None:
+    desk = open_desk("manual")
+    page = desk.page
+    for hidden in ("#snap", "#cancel", "#live", "#confidence", "#note", "#offer"):
+        expect(page.locator(hidden)).to_be_hidden()
+    page.keyboard.press("Space")
+    page.keyboard.press("v")
+    desk.drag("tx", 0.01)
+    assert not {"snap_requested", "live"} & set(kinds(desk))
+    refused = page.request.post(f"{desk.url}/snaps", data={})
+    assert refused.status == 409 and "done by hand alone" in refused.json()["detail"]
+    take_picture(page, "label-manual")
+    page.keyboard.press("?")
+    expect(page.locator("#key-list")).to_contain_text("Undo")
+    expect(page.get_by_text("Snap", exact=True)).to_be_hidden()
