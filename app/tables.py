@@ -210,6 +210,7 @@ class EstimateRow(Base):
     confidence: Mapped[float] = mapped_column(Float)
     covariance: Mapped[list[Any]]
     hypotheses: Mapped[list[Any]]
+    ambiguities: Mapped[list[Any] | None]
     converged: Mapped[bool]
     seed: Mapped[int] = mapped_column(BigInteger)
     config: Mapped[dict[str, Any]]

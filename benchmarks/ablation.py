@@ -76,7 +76,7 @@ def variants() -> list[Variant]:
             "no evidence beyond the outline", replace(DEFAULT, selection=replace(selection, ring=no_ring))
         ),
         Variant(
-            "no lead demanded", replace(DEFAULT, selection=replace(selection, gain_near=0.0, gain_far=0.0))
+            "no lead demanded", replace(DEFAULT, selection=replace(selection, lead=0.0, lead_over_fit=0.0))
         ),
     ]
 

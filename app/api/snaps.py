@@ -58,6 +58,15 @@ class HypothesisOut(BaseModel):
     weight: float
 
 
+class AmbiguityOut(BaseModel):
+    """Something about a pose that the depth does not tell."""
+
+    kind: Literal["other mode", "free motion"]
+    motion: Literal["turn", "shift"]
+    axis: tuple[float, float, float] = Field(description="Direction in the mesh's frame.")
+    extent: float = Field(description="Radians or metres.")
+
+
 class EstimateOut(BaseModel):
     """What a snap found."""
 
@@ -66,6 +75,9 @@ class EstimateOut(BaseModel):
     confidence: float
     covariance: list[list[float]]
     hypotheses: list[HypothesisOut]
+    ambiguities: list[AmbiguityOut] | None = Field(
+        description="What depth does not tell about the pose; null where an older version did not say."
+    )
     converged: bool
     seed: int
     config: dict[str, Any]

@@ -69,6 +69,7 @@ ESTIMATES = pa.schema(
         ("confidence", pa.float64()),
         ("covariance", MATRIX),
         ("hypotheses", JSON_TEXT),
+        ("ambiguities", JSON_TEXT),
         ("converged", pa.bool_()),
         ("seed", pa.int64()),
         ("config", JSON_TEXT),
@@ -103,7 +104,7 @@ def write_table(stem: Path, schema: pa.Schema, rows: Iterator[Record]) -> None:
 
 def parquet_row(row: Record, schema: pa.Schema) -> Record:
     """A record whose fields without a fixed shape are JSON texts."""
-    loose = {name for name in ("detail", "hypotheses", "config") if name in schema.names}
+    loose = {name for name in ("detail", "hypotheses", "ambiguities", "config") if name in schema.names}
     return row | {name: json.dumps(row[name], sort_keys=True) for name in loose}
 
 
@@ -188,6 +189,7 @@ def estimate_record(
         "confidence": estimate.confidence,
         "covariance": estimate.covariance,
         "hypotheses": estimate.hypotheses,
+        "ambiguities": estimate.ambiguities,
         "converged": estimate.converged,
         "seed": estimate.seed,
         "config": estimate.config,

@@ -1,7 +1,7 @@
 """What a session and the machine tell each other about a snap."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Protocol
 
 import numpy as np
@@ -101,6 +101,7 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
             {"T_camera_object": mode.T_camera_object.tolist(), "weight": mode.weight}
             for mode in estimate.hypotheses
         ],
+        ambiguities=[asdict(ambiguity) for ambiguity in estimate.ambiguities],
         converged=estimate.converged,
         seed=order.seed,
         config=order.config.to_dict(),

@@ -119,7 +119,7 @@ export function imagePart(page) {
     { keys: [","], does: "Previous frame", run: () => strip.step(-1) },
     { keys: ["."], does: "Next frame", run: () => strip.step(+1) },
     { keys: ["Z"], does: "Zoom the image to the object, and back to all of it", run: fitOrWhole },
-    { keys: ["O"], does: "Hide the outline on the image, and show it again", run: hideOrShow },
+    { keys: ["H"], does: "Hide the outline on the image, and show it again", run: hideOrShow },
   ];
   return { bindings, open, draw };
 }

@@ -199,11 +199,11 @@ def test_a_key_hides_the_outline_wherever_the_focus_is(image: Image) -> None:
     page = image.page
     outline = page.locator("#outline")
     page.locator("#blend").focus()
-    page.keyboard.press("o")
+    page.keyboard.press("h")
     expect(outline).to_be_hidden()
     expect(page.get_by_role("button", name="Show outline")).to_be_visible()
     page.locator("#view").focus()
-    page.keyboard.press("o")
+    page.keyboard.press("h")
     expect(outline).to_be_visible()
     page.get_by_role("button", name="Hide outline").click()
     expect(outline).to_be_hidden()

@@ -8,7 +8,7 @@ from registration_core.agreement import Prior
 from registration_core.evidence import evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import is_settled, judge, match_shares, shown_shares
+from registration_core.selection import chosen, is_settled, judge, leads, match_shares, shown_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -60,6 +60,24 @@ def test_good_start_is_not_given_up_for_a_far_mode(scene) -> None:
     far = [pose.perturbed(truth, 0.06, 1.0, np.random.default_rng(k)) for k in range(20)]
     candidates = to_rows(np.stack([truth, truth, *far]))
     assert judged(candidates, model, grid, start_at(truth), SnapConfig().selection).winner == 0
+
+
+def test_more_lead_is_demanded_over_a_start_that_fits(scene) -> None:
+    model, grid, truth = scene
+    config = SnapConfig().selection
+    poses = to_rows(np.stack([truth, shifted(truth, x=0.002), shifted(truth, x=0.04)]))
+    fitting, _, astray = evidence(poses, model, grid, truth[2, 3])
+    np.testing.assert_array_equal(
+        leads(poses, fitting, config), [config.lead, config.lead, config.lead_over_fit]
+    )
+    np.testing.assert_array_equal(leads(poses[::-1], astray, config), config.lead)
+
+
+def test_the_winner_leads_by_what_is_demanded_of_it() -> None:
+    scores = np.array([1.0, 2.5, 4.0])
+    assert chosen(scores, 1, np.array([0.0, 1.0, 1.0])) == 2
+    assert chosen(scores, 1, np.array([0.0, 1.0, 2.0])) == 1
+    assert chosen(scores, 1, np.array([0.0, 2.0, 4.0])) == 0
 
 
 def test_share_that_matches_falls_with_the_distance_from_the_truth(scene) -> None:

@@ -73,6 +73,9 @@ def test_a_snap_by_rest_is_the_librarys_snap(
     assert estimate["confidence"] == pytest.approx(expected.confidence)
     assert np.allclose(estimate["covariance"], expected.covariance, rtol=1e-4, atol=1e-12)
     assert len(estimate["hypotheses"]) == len(expected.hypotheses)
+    assert [tuple(a["axis"]) for a in estimate["ambiguities"]] == [
+        pytest.approx(a.axis) for a in expected.ambiguities
+    ]
     assert (estimate["evaluations"], estimate["seed"]) == (expected.evaluations, 7)
     assert SnapConfig.from_dict(estimate["config"]) == SnapConfig()
 

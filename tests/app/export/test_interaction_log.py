@@ -14,6 +14,7 @@ from registration_core import pose
 from .site import POSED, START, TOOL, Site, true_pose
 
 BEFORE, AFTER = np.eye(4).tolist(), true_pose(POSED, TOOL).tolist()
+FREE_TURN = {"kind": "free motion", "motion": "turn", "axis": [0.0, 0.0, 1.0], "extent": 0.4}
 PATH = [[0.0, 0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], [0.05, 0.1, 0.2, 0.4, 1.0, 0.0, 0.0, 0.0]]
 
 
@@ -56,6 +57,7 @@ def fill(site: Site) -> int:
                     confidence=0.9,
                     covariance=np.eye(6).tolist(),
                     hypotheses=[{"T_camera_object": AFTER, "weight": 1.0}],
+                    ambiguities=[FREE_TURN],
                     converged=True,
                     seed=2**40,
                     config={"particles": 625, "nested": {"a": 1}},
@@ -122,12 +124,13 @@ def test_an_estimate_has_what_repeats_it(site: Site, tmp_path: Path) -> None:
     assert estimate["start_spread"] == [0.03, 0.35]
     assert estimate["T_world_object_start"] == BEFORE
     assert estimate["hypotheses"] == [{"T_camera_object": AFTER, "weight": 1.0}]
+    assert estimate["ambiguities"] == [FREE_TURN]
 
 
 def test_parquet_holds_the_same(site: Site, tmp_path: Path) -> None:
     fill(site)
     folder = tmp_path / "log"
-    loose = ("detail", "hypotheses", "config")
+    loose = ("detail", "hypotheses", "ambiguities", "config")
     for name, rows in zip(("events", "estimates"), written(site, folder), strict=True):
         table = pq.read_table(folder / f"{name}.parquet").to_pylist()
         assert len(table) == len(rows)

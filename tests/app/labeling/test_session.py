@@ -12,7 +12,7 @@ from app.labeling.history import History, Step
 from app.labeling.session import ActionError, LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.tables import EstimateRow
-from registration_core import Estimate, Hypothesis, SnapConfig, pose
+from registration_core import Ambiguity, Estimate, Hypothesis, SnapConfig, pose
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
@@ -86,7 +86,7 @@ def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
         seconds=0.25,
         evaluations=1234,
         converged=True,
-        ambiguities=(),
+        ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
     )
     return SnapResult(estimate, T, "1.2.3", "a test machine")
@@ -187,6 +187,30 @@ def test_while_the_object_is_held_nothing_else_may_move_it(bench, action):
     with pytest.raises(ActionError, match="let go"):
         bench.session.set_pose(shifted(1.0), Actor.SCRIPT)
     assert bench.log.events == []
+
+
+def test_a_drag_along_the_worlds_axes_is_recorded_as_such(bench):
+    bench.session.align_gizmo("world")
+    assert bench.state.gizmo_axes == "world"
+    along_y = START.copy()
+    along_y[1, 3] += 0.02
+    bench.drag(along_y)
+    (event,) = bench.log.events
+    assert (event.dof, event.detail) == (("ty",), {"axes": "world"})
+    bench.session.start_drag()
+    with pytest.raises(ActionError, match="being dragged"):
+        bench.session.align_gizmo("object")
+    assert bench.state.gizmo_axes == "world"
+
+
+def test_a_move_starts_from_the_present_pose_and_says_how(bench):
+    for _ in range(3):
+        bench.session.move(lambda T: T @ pose.exp([0.01, 0, 0, 0, 0, 0]), Actor.HUMAN, "nudge")
+    assert np.allclose(bench.state.T_world_object, shifted(0.03))
+    assert [event.detail for event in bench.log.events] == [{"technique": "nudge"}] * 3
+    bench.session.start_drag()
+    with pytest.raises(ActionError, match="being dragged"):
+        bench.session.move(lambda T: pytest.fail("it is held"), Actor.HUMAN, "nudge")
 
 
 # -- record first
@@ -335,6 +359,8 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
     assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
+    (ambiguity,) = row.ambiguities
+    assert ambiguity == {"kind": "free motion", "motion": "turn", "axis": (0.0, 0.0, 1.0), "extent": 0.4}
 
 
 def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
