@@ -8,7 +8,19 @@ import httpx
 from fastapi import FastAPI
 
 from app import __version__, pages
-from app.api import datasets, exports, health, objects, problems, registrations, scenes, sign_in, snaps, tasks
+from app.api import (
+    datasets,
+    exports,
+    health,
+    objects,
+    placement,
+    problems,
+    registrations,
+    scenes,
+    sign_in,
+    snaps,
+    tasks,
+)
 from app.auth import Auth
 from app.config import Settings
 from app.database import Database
@@ -74,8 +86,20 @@ def create_app(services: Services) -> FastAPI:
     )
     app.state.services = services
     problems.install(app)
-    for module in (health, sign_in, datasets, scenes, objects, tasks, registrations, snaps, exports, proxy):
+    for module in (
+        health,
+        sign_in,
+        datasets,
+        scenes,
+        objects,
+        tasks,
+        registrations,
+        placement,
+        snaps,
+        exports,
+    ):
         app.include_router(module.router)
+    app.include_router(proxy.router)
     pages.install(app)
     return app
 

@@ -41,7 +41,7 @@ def judge(candidates: Array32, counts: Array, near: int, prior: Prior, config: S
         counts: (N, evidence.COUNT), their evidence.
     """
     values = scores(counts, heavy_tails(candidates, prior), config)
-    return Judgement(chosen(values, near, lead(counts[0], config)), values, counts)
+    return Judgement(chosen(values, near, leads(candidates, counts[0], config)), values, counts)
 
 
 def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
@@ -52,25 +52,30 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
     return counts @ weights + config.match_share * match_shares(counts) - config.prior * tails
 
 
-def lead(start: Array, config: SelectionConfig) -> float:
-    """What any other pose must score more than one that stands, for a start with such counts (COUNT,): much,
-    where it fits, for then the operator is probably right.
+def leads(candidates: Array32, counts: Array, config: SelectionConfig) -> Array:
+    """What each of the poses (N, 3, 4), the start first, must score more than the one that stands, (N,).
+
+    Much where the start fits, by its counts (COUNT,), and the pose is another: the operator is probably right
+    then, and a small correction does no harm.
     """
-    fits = match_shares(start[None])[0] > config.fit_match
-    return config.lead_over_fit if fits else config.lead
+    fits = match_shares(counts[None])[0] > config.fit_match
+    moved = np.linalg.norm(candidates[:, :, 3] - candidates[0, :, 3], axis=1)
+    turned = np.array([squared_angle(T, candidates[0]) for T in candidates])
+    aside = (moved > config.aside_translation) | (turned > config.aside_rotation**2)
+    return np.where(fits & aside, config.lead_over_fit, config.lead)
 
 
-def chosen(scores: Array, near: int, lead: float) -> int:
-    """The winner among the start, `near` polishes of it, and other modes.
+def chosen(scores: Array, near: int, leads: Array) -> int:
+    """The winner among the start, `near` polishes of it, and other modes, of scores and leads (N,).
 
-    The best polish replaces the start only where it scores better by the lead, and another mode replaces what
+    The best polish replaces the start only where it scores better by its lead, and another mode replaces what
     stands then only where it does so again: in doubt the operator is right.
     """
-    winner = 0
+    winner, led = 0, scores - leads
     for first, last in ((1, 1 + near), (1 + near, len(scores))):
         if first < last:
-            best = first + int(np.argmax(scores[first:last]))
-            if scores[best] > scores[winner] + lead:
+            best = first + int(np.argmax(led[first:last]))
+            if led[best] > scores[winner]:
                 winner = best
     return winner
 

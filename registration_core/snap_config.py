@@ -120,9 +120,13 @@ class SelectionConfig:
     """The polished start replaces the start, and another mode replaces that, only if it scores better by this
     much, ..."""
     lead_over_fit: float = 4.0
-    """... or by this much where the start itself fits ..."""
+    """... or by this much where the start itself fits, ..."""
     fit_match: float = 0.7
-    """... so that more of the claimed surface than this is matched."""
+    """... which it does where more of the claimed surface than this is matched, ..."""
+    aside_translation: float = 0.004
+    """... and the pose is farther from it than this, metres, ..."""
+    aside_rotation: float = 0.07
+    """... or this, radians."""
     min_match: float = 0.04
     """With less of the claimed surface matched than this, the start is kept."""
     settled_match: float = 0.9
@@ -218,7 +222,12 @@ class RoundConfig:
     """The round is left out where the confidence so far is higher than this."""
 
 
-DEFAULT_ROUNDS = (RoundConfig(0.3, 1.0, 1.0), RoundConfig(0.5, 1.4, 0.95), RoundConfig(0.6, 1.6, 0.6))
+DEFAULT_ROUNDS = (
+    RoundConfig(0.3, 1.0, 1.0),
+    RoundConfig(0.5, 1.4, 0.95),
+    RoundConfig(0.6, 1.6, 0.6),
+    RoundConfig(1.0, 1.6, 0.2),
+)
 
 
 @dataclass(frozen=True)

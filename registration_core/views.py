@@ -23,7 +23,7 @@ from registration_core.problem import OutOfViewError, checked_problem
 from registration_core.report import UNSEEN_CONFIDENCE
 from registration_core.search import NEAR_ITERATIONS, NEAR_TUKEY, Search
 from registration_core.seeding import seed_of
-from registration_core.selection import chosen, lead, match_shares, scores
+from registration_core.selection import chosen, leads, match_shares, scores
 from registration_core.snap_config import SnapConfig
 from registration_core.viewpoint_model import ViewpointModel, viewpoint_model
 
@@ -114,7 +114,8 @@ def snap_views(
     counts = _evidence(seen, candidates)
     values = scores(counts, tails, config.selection)
     shares = counts / len(seen)
-    winner = chosen(values, len(NEAR_TUKEY), lead(shares[0], config.selection))
+    demanded = leads(to_rows(candidates), shares[0], config.selection)
+    winner = chosen(values, len(NEAR_TUKEY), demanded)
     if match_shares(shares[[winner]])[0] < config.selection.min_match:
         return _estimate(seen, start[None], np.ones(1), UNSEEN_CONFIDENCE, False, seed, started)
     if winner > 0:

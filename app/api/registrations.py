@@ -14,6 +14,7 @@ from sqlalchemy import select
 
 from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of, rigid_pose
 from app.auth import Actor
+from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat
 from app.labeling.session import LabelingSession, SessionState
 from app.tables import Event, Pose
@@ -72,6 +73,8 @@ class RegistrationOut(BaseModel):
     can_undo: bool
     can_redo: bool
     dragging: bool
+    gizmo_axes: GizmoAxes
+    """Along which the gizmo's arrows lie."""
     saved: bool
     """Whether all of it is on the disk: a drag is when it ends."""
     snap: SnapOut | None
@@ -248,6 +251,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         can_undo=state.can_undo,
         can_redo=state.can_redo,
         dragging=state.dragging,
+        gizmo_axes=state.gizmo_axes,
         saved=not state.dragging,
         snap=_snap_out(state),
         offer=_offer_out(state),

@@ -289,7 +289,7 @@ class _Shown:
             self._frame_id = state.frame_id
             self._show_cloud(self._frames[state.frame_id])
         if not state.dragging:
-            self._view.move_object(state.T_world_object)
+            self._view.move_object(state.T_world_object, state.gizmo_axes)
         ghost = state.live or state.offer
         if ghost is not self._ghost:
             self._ghost = ghost

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from app.auth import Actor
 from app.event_log import NewEvent
-from app.labeling.degrees_of_freedom import degrees_of_freedom
+from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 
 Array = NDArray[np.float64]
 
@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 class Drag:
     """Follows T_world_object from the moment the gizmo is held; times are those of this process's clock."""
 
-    def __init__(self, T_world_object: Array) -> None:
+    def __init__(self, T_world_object: Array, axes: GizmoAxes = "object") -> None:
         self._T_start = T_world_object
+        self._axes = axes
         self._began = time.monotonic()
         self._path = [[0.0, *_path_row(T_world_object)]]
         self.T_now = T_world_object
@@ -33,7 +34,7 @@ class Drag:
         Args:
             pivot: The gizmo's place (3,) on the object, metres, in the object's frame.
         """
-        dof = degrees_of_freedom(self._T_start, self.T_now, pivot)
+        dof = degrees_of_freedom(self._T_start, self.T_now, pivot, self._axes)
         if not dof:
             return None
         return NewEvent(
@@ -44,6 +45,7 @@ class Drag:
             dof=dof,
             path=self._path,
             duration_seconds=time.monotonic() - self._began,
+            detail={"axes": self._axes},
         )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.auth import Actor
 from app.event_log import NewEvent
-from app.labeling.degrees_of_freedom import degrees_of_freedom
+from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
 from app.labeling.machine import Machine, SamePose
@@ -41,6 +41,7 @@ class SessionState:
     can_undo: bool
     can_redo: bool
     dragging: bool
+    gizmo_axes: GizmoAxes
     snap: SnapStatus | None
     offer: Offer | None
     is_live: bool
@@ -88,6 +89,7 @@ class LabelingSession:
         )
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
+        self._gizmo_axes: GizmoAxes = "object"
         self.last_used = time.monotonic()
 
     # -- what is seen ------------------------------------------------------------------------------
@@ -105,6 +107,7 @@ class LabelingSession:
                 can_undo=self._is_open and history.can_undo,
                 can_redo=self._is_open and history.can_redo,
                 dragging=track.drag is not None,
+                gizmo_axes=self._gizmo_axes,
                 snap=self._machine.status,
                 offer=self._machine.offer,
                 is_live=self._machine.is_live,
@@ -135,7 +138,7 @@ class LabelingSession:
         with self._lock:
             if not self._is_open:
                 return
-            self._track.drag = Drag(self._track.history.current.T_world_object)
+            self._track.drag = Drag(self._track.history.current.T_world_object, self._gizmo_axes)
             self._changed()
 
     def drag_to(self, T_world_object: Array) -> None:
@@ -178,6 +181,19 @@ class LabelingSession:
                 detail={} if technique is None else {"technique": technique},
             )
             self._move(event, Step(T_world_object))
+            self._changed()
+
+    def move(self, change: Callable[[Array], Array], actor: Actor, technique: str) -> None:
+        """Put the object where `change` leads from its present pose; nothing comes between the two."""
+        with self._lock:
+            self._require_free_hands()
+            self.set_pose(change(self._track.history.current.T_world_object), actor, technique)
+
+    def align_gizmo(self, axes: GizmoAxes) -> None:
+        """Let the gizmo's arrows lie along other axes; each drag is logged with those that it had."""
+        with self._lock:
+            self._require_free_hands()
+            self._gizmo_axes = axes
             self._changed()
 
     def reset(self, actor: Actor) -> None:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from viser import _messages
 
+from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.viewpoint import Viewpoint
 from registration_core import ObjectModel, pose
 
 Array = NDArray[np.float64]
@@ -58,7 +60,8 @@ class SceneView:
     def __init__(
         self, model: ObjectModel, T_world_object: Array, first_view: FirstView, drag: DragHandlers
     ) -> None:
-        self._T_object_gizmo = pose.from_rotation_translation(np.eye(3), model.centre)
+        self._pivot = model.centre
+        self._T_gizmo_object = pose.from_rotation_translation(np.eye(3), -model.centre)
         self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
         _refuse_sharing(self._server)
         self._server.gui.configure_theme(
@@ -68,7 +71,7 @@ class SceneView:
         self._place_camera(first_view)
         self._model = model
         self._ghost: viser.MeshHandle | None = None
-        self._gizmo = self._add_object(model, T_world_object)
+        self._gizmo, self._mesh = self._add_object(model, T_world_object)
         self._follow_drags(drag)
 
     @property
@@ -82,12 +85,41 @@ class SceneView:
             "/cloud", points, colors, point_size=point_size, point_shape="circle", precision="float32"
         )
 
-    def move_object(self, T_world_object: Array) -> None:
-        """Put object and gizmo at a pose. Not while a drag goes on: the page would overwrite it."""
-        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+    def move_object(self, T_world_object: Array, gizmo_axes: GizmoAxes = "object") -> None:
+        """Put object and gizmo at a pose. Not while a drag goes on: the page would overwrite it.
+
+        The page turns the gizmo with what it drags; a gizmo in the world's axes gets its rotation back here,
+        and the mesh, which hangs on it, the rotation that the gizmo had gathered.
+        """
+        rotation = T_world_object[:3, :3] if gizmo_axes == "object" else np.eye(3)
+        T_world_gizmo = pose.from_rotation_translation(rotation, pose.apply(T_world_object, self._pivot))
+        self._T_gizmo_object = pose.inverse(T_world_gizmo) @ T_world_object
         with self._server.atomic():
-            self._gizmo.position = position
-            self._gizmo.wxyz = wxyz
+            self._gizmo.position, self._gizmo.wxyz = _to_viser(T_world_gizmo)
+            _, self._mesh.wxyz = _to_viser(self._T_gizmo_object)
+
+    @property
+    def viewpoint(self) -> Viewpoint | None:
+        """From where the operator looks; None while no page shows the view."""
+        clients = self._server.get_clients()
+        if not clients:
+            return None
+        camera = clients[max(clients)].camera
+        return Viewpoint(
+            T_world_camera=_from_viser(camera.position, camera.wxyz),
+            distance=float(np.linalg.norm(camera.look_at - camera.position)),
+            up=camera.up_direction / np.linalg.norm(camera.up_direction),
+            field_of_view=camera.fov,
+            aspect=camera.aspect,
+        )
+
+    def look(self, viewpoint: Viewpoint) -> None:
+        """Let every page that shows the view look from there."""
+        for client in self._server.get_clients().values():
+            with client.atomic():
+                client.camera.up_direction = viewpoint.up
+                client.camera.position = viewpoint.position
+                client.camera.look_at = viewpoint.target
 
     def show_ghost(self, T_world_object: Array | None) -> None:
         """Show where the machine would put the object; None shows nothing."""
@@ -126,8 +158,10 @@ class SceneView:
         camera.up = up
         camera.fov = float(np.clip(view.field_of_view, *FIELD_OF_VIEW_LIMITS))
 
-    def _add_object(self, model: ObjectModel, T_world_object: Array) -> viser.TransformControlsHandle:
-        position, wxyz = _to_viser(T_world_object @ self._T_object_gizmo)
+    def _add_object(
+        self, model: ObjectModel, T_world_object: Array
+    ) -> tuple[viser.TransformControlsHandle, viser.MeshHandle]:
+        position, wxyz = _to_viser(T_world_object @ pose.inverse(self._T_gizmo_object))
         gizmo = self._server.scene.add_transform_controls(
             "/object",
             scale=GIZMO_SIZE * model.diameter,
@@ -136,8 +170,8 @@ class SceneView:
             position=position,
             wxyz=wxyz,
         )
-        self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
-        return gizmo
+        mesh = self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
+        return gizmo, mesh
 
     def _add_mesh(
         self, name: str, color: tuple[int, int, int], opacity: float, size: float = 1.0
@@ -164,7 +198,7 @@ class SceneView:
             gizmo = event.target
             if np.isfinite([*gizmo.position, *gizmo.wxyz]).all() and gizmo.wxyz.any():
                 T_world_gizmo = _from_viser(gizmo.position, gizmo.wxyz)
-                drag.on_move(T_world_gizmo @ pose.inverse(self._T_object_gizmo))
+                drag.on_move(T_world_gizmo @ self._T_gizmo_object)
             if event.phase == "end":
                 drag.on_end()
                 await asyncio.sleep(0)

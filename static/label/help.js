@@ -5,11 +5,12 @@ import { MOD } from "./keys.js";
 
 const SHOWN = { Mod: MOD, Escape: "Esc" };
 
-/** Fills the overlay with {keys, does, machine?}; returns the function that opens it. */
+/** Fills the overlay with {keys, does, machine?, caps?}, `caps` standing for many keys; returns what opens it. */
 export function setUpHelp(bindings) {
-  const rows = bindings.map(({ keys, does, machine }) => {
+  const rows = bindings.map(({ keys, does, machine, caps }) => {
     const props = machine ? { "data-machine": "" } : {};
-    return element("div", props, element("dt", {}, ...keyCaps(keys)), element("dd", {}, does));
+    const term = element("dt", {}, ...(caps ? joinedCaps(caps) : keyCaps(keys)));
+    return element("div", props, term, element("dd", {}, does));
   });
   byId("key-list").replaceChildren(...rows);
   const open = () => byId("keys").showModal();
@@ -19,7 +20,11 @@ export function setUpHelp(bindings) {
 
 function keyCaps(keys) {
   return keys.flatMap((chord, index) => {
-    const caps = chord.split("+").flatMap((key) => [element("kbd", {}, SHOWN[key] ?? key), " "]);
-    return index === 0 ? caps : ["or ", ...caps];
+    const caps = joinedCaps(chord.split("+"));
+    return index === 0 || keys.length > 2 ? caps : ["or ", ...caps];
   });
+}
+
+function joinedCaps(caps) {
+  return caps.flatMap((key) => [element("kbd", {}, SHOWN[key] ?? key), " "]);
 }

@@ -4,7 +4,7 @@
 export const MOD = /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl";
 
 /**
- * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}.
+ * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}; `run` is handed the key.
  *
  * "Mod" is Ctrl or Cmd. viser takes W A S D Q E and the arrows for its camera, so no binding may.
  */
@@ -12,11 +12,12 @@ export function keyBindings(bindings) {
   const byChord = new Map(bindings.flatMap((binding) => binding.keys.map((key) => [key, binding])));
 
   function onKeyDown(event) {
-    const binding = byChord.get(chord(event));
+    const pressed = chord(event);
+    const binding = byChord.get(pressed);
     if (!binding || belongsToControl(event) || document.querySelector("dialog[open]")) return;
     event.preventDefault();
     event.stopPropagation();
-    if (!event.repeat || binding.repeats) binding.run();
+    if (!event.repeat || binding.repeats) binding.run(pressed);
   }
 
   return (target) => target.addEventListener("keydown", onKeyDown, { capture: true });
@@ -24,7 +25,7 @@ export function keyBindings(bindings) {
 
 /** "Mod+Shift+Z", "Space", "?": Shift is named only where it does not already change the character. */
 export function chord(event) {
-  const key = event.key === " " ? "Space" : event.key.length === 1 ? event.key.toUpperCase() : event.key;
+  const key = keyName(event);
   const letterOrNamed = /^[A-Z]$|^..+$/.test(key);
   const parts = [
     (event.ctrlKey || event.metaKey) && "Mod",
@@ -33,6 +34,13 @@ export function chord(event) {
     key,
   ];
   return parts.filter(Boolean).join("+");
+}
+
+/** With Alt, a Mac types other characters: the key's own letter counts. */
+function keyName({ key, code, altKey }) {
+  if (altKey && /^Key[A-Z]$/.test(code) && !/^[a-z]$/i.test(key)) return code.at(-1);
+  if (key === " ") return "Space";
+  return key.length === 1 ? key.toUpperCase() : key;
 }
 
 /** Typing stays typing, and Space or Enter on a focused button press that button. */
@@ -47,6 +55,6 @@ function belongsToControl(event) {
 export function releaseFocusAfterPointer(root) {
   root.addEventListener("click", (event) => {
     const byPointer = event.detail > 0;
-    if (byPointer) event.target.closest("button")?.blur();
+    if (byPointer) event.target.closest("button, summary")?.blur();
   });
 }

@@ -2,8 +2,9 @@
  * The labelling page: joins the 3-D view, the panel, the keys and the server.
  *
  * What else there is on the page are parts: makers that take the `page` below and return any of
- * `bindings` (keys), `open(task, scene, object)`, called once, and `draw(registration, before)`, called
- * for every new state.
+ * `bindings` (keys), `open(task, scene, object)`, called once, `draw(registration, before)`, called for
+ * every new state, `attach(window)`, called for each document of the 3-D view, and `leave()`, which leaves
+ * a mode and tells whether there was one to leave.
  */
 
 import { del, get, post } from "../api.js";
@@ -14,9 +15,13 @@ import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { machinePart } from "./machine.js";
 import { showNext } from "./next.js";
+import { numbersPart } from "./numbers.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
+import { placePart } from "./place.js";
+import { precisionPart } from "./precision.js";
 import { followRegistration } from "./stream.js";
 import { closeView, focusView, openView } from "./view.js";
+import { viewsPart } from "./views.js";
 
 const taskId = location.pathname.split("/").filter(Boolean).at(-1);
 const message = messageArea(byId("message"));
@@ -32,8 +37,16 @@ const page = {
   registration: () => registration,
   isConnected: () => connected,
   act,
+  canMove: () => connected && registration?.state === "open" && !registration.dragging,
 };
-const PARTS = [imagePart(page), machinePart(page)];
+const PARTS = [
+  imagePart(page),
+  machinePart(page),
+  numbersPart(page),
+  placePart(page),
+  precisionPart(page),
+  viewsPart(page),
+];
 
 const ACTIONS = {
   snap: requestSnap,
@@ -48,7 +61,7 @@ const ACTIONS = {
 
 const BINDINGS = [
   { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
-  { keys: ["Escape"], does: "Cancel the snap", run: () => act("cancel"), machine: true },
+  { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
   { keys: ["Y"], does: "Accept the machine's offer or ghost", run: () => act("offer-accept"), machine: true },
   { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
@@ -76,7 +89,7 @@ async function openTask() {
   const [started, described] = await Promise.all([start(), get(`/api/tasks/${taskId}`)]);
   task = described;
   showTask();
-  openView(started.view_url, attachKeys);
+  openView(started.view_url, attachToView);
   const [scene, object] = await Promise.all([
     get(`/api/scenes/${task.scene.id}`),
     get(`/api/objects/${task.object.id}`),
@@ -162,6 +175,15 @@ async function requestSnap() {
     show({ ...registration, snap: before });
     throw error;
   }
+}
+
+function attachToView(viewWindow) {
+  attachKeys(viewWindow);
+  for (const part of PARTS) part.attach?.(viewWindow);
+}
+
+function leaveOrCancel() {
+  if (!PARTS.some((part) => part.leave?.())) act("cancel");
 }
 
 function submitOrGoOn() {

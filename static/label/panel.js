@@ -2,7 +2,6 @@
 
 import { byId, icon, setText } from "../dom.js";
 import { hintFor } from "./hint.js";
-import { poseNumbers } from "./pose.js";
 
 const SNAP_STATUS = {
   queued: "Waiting for a worker…",
@@ -44,7 +43,6 @@ export function drawPanel(registration, connected) {
   for (const [id, can] of Object.entries(possible(registration, connected))) byId(id).disabled = !can;
   drawSaved(registration, connected);
   drawConfidence(registration);
-  drawPose(registration);
   drawSnap(registration);
   drawOffer(registration);
   setText(byId("hint"), hintFor(registration));
@@ -72,12 +70,6 @@ function drawConfidence({ confidence, can_undo: moved }) {
   badge.dataset.source = source;
   const words = { machine: "posed by the machine", human: "posed by hand", start: "start pose" };
   badge.replaceChildren(icon(source === "start" ? "open" : source), words[source]);
-}
-
-function drawPose({ T_camera_object: T }) {
-  for (const [name, text] of Object.entries(poseNumbers(T))) {
-    setText(document.querySelector(`[data-pose=${name}]`), text);
-  }
 }
 
 function drawSnap(registration) {

@@ -35,3 +35,31 @@ function oneDecimal(number) {
   const text = number.toFixed(1);
   return text === "-0.0" ? "0.0" : text;
 }
+
+const NAMES = { x: 0, y: 1, z: 2, rx: 0, ry: 1, rz: 2 };
+
+/** T with one of its `poseNumbers` changed to `value` [mm or degrees], the others exactly as they were. */
+export function withNumber(T, name, value) {
+  const vector = name.startsWith("r") ? rotationVector(T) : T.slice(0, 3).map((row) => row[3]);
+  vector[NAMES[name]] = name.startsWith("r") ? value / DEGREES : value / 1000;
+  const rotation = name.startsWith("r") ? rotationMatrix(vector) : T;
+  const position = name.startsWith("r") ? T.slice(0, 3).map((row) => row[3]) : vector;
+  return [0, 1, 2].map((i) => [...rotation[i].slice(0, 3), position[i]]).concat([[0, 0, 0, 1]]);
+}
+
+/** Product of two poses. */
+export function product(A, B) {
+  return A.map((row) => B[0].map((_, j) => row.reduce((sum, value, k) => sum + value * B[k][j], 0)));
+}
+
+/** Rodrigues' formula: the matrix of a rotation vector [rad]. */
+function rotationMatrix(vector) {
+  const angle = Math.hypot(...vector);
+  const [x, y, z] = vector.map((component) => component / (angle || 1));
+  const [c, s, t] = [Math.cos(angle), Math.sin(angle), 1 - Math.cos(angle)];
+  return [
+    [c + t * x * x, t * x * y - s * z, t * x * z + s * y],
+    [t * x * y + s * z, c + t * y * y, t * y * z - s * x],
+    [t * x * z - s * y, t * y * z + s * x, c + t * z * z],
+  ];
+}

@@ -8,7 +8,7 @@ from registration_core.agreement import Prior
 from registration_core.evidence import evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import chosen, is_settled, judge, lead, match_shares, shown_shares
+from registration_core.selection import chosen, is_settled, judge, leads, match_shares, shown_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -65,11 +65,19 @@ def test_good_start_is_not_given_up_for_a_far_mode(scene) -> None:
 def test_more_lead_is_demanded_over_a_start_that_fits(scene) -> None:
     model, grid, truth = scene
     config = SnapConfig().selection
-    fitting, astray = evidence(to_rows(np.stack([truth, shifted(truth, x=0.04)])), model, grid, truth[2, 3])
-    assert lead(fitting, config) == config.lead_over_fit > lead(astray, config) == config.lead
-    scores = np.array([1.0, 1.5, 1.0 + config.lead_over_fit])
-    assert chosen(scores, 1, config.lead_over_fit) == 0
-    assert chosen(scores, 1, config.lead) == 2
+    poses = to_rows(np.stack([truth, shifted(truth, x=0.002), shifted(truth, x=0.04)]))
+    fitting, _, astray = evidence(poses, model, grid, truth[2, 3])
+    np.testing.assert_array_equal(
+        leads(poses, fitting, config), [config.lead, config.lead, config.lead_over_fit]
+    )
+    np.testing.assert_array_equal(leads(poses[::-1], astray, config), config.lead)
+
+
+def test_the_winner_leads_by_what_is_demanded_of_it() -> None:
+    scores = np.array([1.0, 2.5, 4.0])
+    assert chosen(scores, 1, np.array([0.0, 1.0, 1.0])) == 2
+    assert chosen(scores, 1, np.array([0.0, 1.0, 2.0])) == 1
+    assert chosen(scores, 1, np.array([0.0, 2.0, 4.0])) == 0
 
 
 def test_share_that_matches_falls_with_the_distance_from_the_truth(scene) -> None:

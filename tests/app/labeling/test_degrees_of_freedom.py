@@ -85,3 +85,11 @@ def test_a_turn_about_the_pivot_seen_from_another_pivot_moves_too():
 @pytest.mark.parametrize("angle", [np.pi - 1e-6, -np.pi + 1e-6])
 def test_half_a_turn_is_still_one_rotation(angle):
     assert degrees_of_freedom(np.eye(4), turn(1, angle), np.zeros(3)) == ("ry",)
+
+
+@given(poses, vectors, axes, amounts)
+def test_a_gizmo_in_the_worlds_axes_moves_along_and_turns_about_them(T, pivot, axis, amount):
+    centre = pose.from_rotation_translation(np.eye(3), pose.apply(T, pivot))
+    for letter, motion in (("t", shift(axis, amount)), ("r", turn(axis, amount))):
+        moved = centre @ motion @ pose.inverse(centre) @ T
+        assert degrees_of_freedom(T, moved, pivot, "world") == (f"{letter}{AXES[axis]}",)

@@ -192,6 +192,30 @@ def test_while_the_object_is_held_nothing_else_may_move_it(bench, action):
     assert bench.log.events == []
 
 
+def test_a_drag_along_the_worlds_axes_is_recorded_as_such(bench):
+    bench.session.align_gizmo("world")
+    assert bench.state.gizmo_axes == "world"
+    along_y = START.copy()
+    along_y[1, 3] += 0.02
+    bench.drag(along_y)
+    (event,) = bench.log.events
+    assert (event.dof, event.detail) == (("ty",), {"axes": "world"})
+    bench.session.start_drag()
+    with pytest.raises(ActionError, match="being dragged"):
+        bench.session.align_gizmo("object")
+    assert bench.state.gizmo_axes == "world"
+
+
+def test_a_move_starts_from_the_present_pose_and_says_how(bench):
+    for _ in range(3):
+        bench.session.move(lambda T: T @ pose.exp([0.01, 0, 0, 0, 0, 0]), Actor.HUMAN, "nudge")
+    assert np.allclose(bench.state.T_world_object, shifted(0.03))
+    assert [event.detail for event in bench.log.events] == [{"technique": "nudge"}] * 3
+    bench.session.start_drag()
+    with pytest.raises(ActionError, match="being dragged"):
+        bench.session.move(lambda T: pytest.fail("it is held"), Actor.HUMAN, "nudge")
+
+
 # -- record first
 
 

@@ -2,10 +2,11 @@
 
 import socket
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from registration_core import ObjectModel, pose
@@ -60,6 +61,10 @@ def view(hand: Hand, model: ObjectModel) -> Iterator[SceneView]:
     opened = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end))
     yield opened
     opened.close()
+
+
+def rotation_of(wxyz) -> np.ndarray:
+    return Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
 
 
 def connect(view: SceneView) -> ViserClient:
@@ -150,6 +155,50 @@ def test_a_drag_over_the_wire_tells_start_moves_and_end_in_order(view, hand, mod
     assert hand.calls == ["start"] + ["move"] * 6 + ["end"]
     for told, T in zip(hand.poses, [*way, way[-1]], strict=True):
         assert told == pytest.approx(T, abs=1e-9)
+
+
+def test_a_gizmo_in_the_worlds_axes_carries_the_turned_mesh(view, hand, model):
+    """It stands upright at first, turns with the hand, and is set upright again while the mesh stays."""
+    centre = pose.apply(T_WORLD_OBJECT, model.centre)
+    turn = pose.exp([0.02, 0, 0, 0, 0, 0.4])
+    with connect(view) as client:
+        view.move_object(T_WORLD_OBJECT, "world")
+        upright = client.wait_for(
+            "SetOrientationMessage", lambda m: m["name"] == "/object" and m["wxyz"][0] == 1
+        )
+        mesh = client.wait_for(
+            "SetOrientationMessage", lambda m: m["name"] == "/object/mesh" and m["wxyz"][0] < 1
+        )
+        assert upright["wxyz"] == pytest.approx((1, 0, 0, 0))
+        assert rotation_of(mesh["wxyz"]) == pytest.approx(T_WORLD_OBJECT[:3, :3])
+        client.drag([pose.from_rotation_translation(np.eye(3), centre) @ turn])
+        hand.wait_for_ends(1)
+        moved = hand.poses[-1]
+        assert moved[:3, :3] == pytest.approx(turn[:3, :3] @ T_WORLD_OBJECT[:3, :3])
+        assert pose.apply(moved, model.centre) == pytest.approx(np.add(centre, [0.02, 0, 0]))
+        seen = len(client.messages)
+        view.move_object(moved, "world")
+        client.wait_for(
+            "SetOrientationMessage",
+            lambda m: m["name"] == "/object/mesh" and np.allclose(rotation_of(m["wxyz"]), moved[:3, :3]),
+        )
+        assert any(
+            m["type"] == "SetOrientationMessage" and m["name"] == "/object" for m in client.messages[seen:]
+        )
+
+
+def test_what_the_page_looks_from_is_known_and_can_be_changed(view):
+    assert view.viewpoint is None
+    with connect(view) as client:
+        wait_until(lambda: view.viewpoint is not None, "the page to be known")
+        there = view.viewpoint
+        assert there.position == pytest.approx([1, 1, 1])
+        assert there.distance == pytest.approx(np.sqrt(3))
+        assert there.aspect == pytest.approx(800 / 600)
+        view.look(replace(there, T_world_camera=NEAR_VIEW, distance=0.4, up=-NEAR_VIEW[:3, 1]))
+        position = client.wait_for("SetCameraPositionMessage", lambda m: not m["initial"])["position"]
+        assert position == pytest.approx(NEAR_VIEW[:3, 3])
+        wait_until(lambda: np.allclose(view.viewpoint.T_world_camera, NEAR_VIEW), "the camera's new place")
 
 
 def test_many_quick_drags_stay_apart(view, hand, model):

@@ -1,0 +1,306 @@
+"""Small and exact changes of the pose, views, and placing by a click, with keys and mouse on a demo scene."""
+
+import json
+import re
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from registration_core import ObjectModel, pose
+from tests.conftest import REPOSITORY
+from tests.e2e.conftest import take_picture
+from tests.e2e.gizmo import STANDS_STILL, pixel
+from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+DEMO = REPOSITORY / "scenes" / "demo"
+BOTTLE = 3
+MODEL = ObjectModel.load(DEMO / f"models/obj_{BOTTLE:06d}.ply", unit="mm")
+CAMERA = """() => {
+  const camera = window.__viserMutable.camera;
+  camera.updateMatrixWorld();
+  return camera.matrixWorld.elements;
+}"""
+
+
+class PreciseDesk(Desk):
+    """A labelling page, with what is needed to say where things are."""
+
+    @property
+    def frame_info(self) -> dict:
+        scene = self.page.request.get(f"{self.root}/api/scenes/{self.task['scene']['id']}").json()
+        return next(frame for frame in scene["frames"] if frame["id"] == self.state["frame_id"])
+
+    @property
+    def T_world_camera(self) -> np.ndarray:
+        return np.array(self.frame_info["T_world_camera"])
+
+    @property
+    def camera(self) -> np.ndarray:
+        """Pose of the 3-D view's camera in the browser, in three.js' world."""
+        return np.array(self.frame.evaluate(CAMERA)).reshape(4, 4).T
+
+    def moves(self) -> int:
+        items = self.page.request.get(f"{self.url}/events?limit=500").json()["items"]
+        return sum(event["kind"] == "set_pose" for event in items)
+
+    def change(self, act: Callable[[], object]) -> dict:
+        """The change of pose that an action brings."""
+        before = self.moves()
+        act()
+        return self.events("set_pose", before + 1)[-1]
+
+    def press(self, key: str) -> dict:
+        return self.change(lambda: self.page.keyboard.press(key))
+
+    def wait_for_camera(self, before: np.ndarray) -> np.ndarray:
+        """Where the camera stands still after it has left a place."""
+        self.frame.wait_for_function(
+            "before => window.__viserMutable.camera.matrixWorld.elements"
+            ".some((x, i) => Math.abs(x - before[i]) > 1e-3)",
+            arg=before.T.ravel().tolist(),
+        )
+        self.frame.evaluate(STANDS_STILL)
+        return self.camera
+
+
+def true_centre(desk: PreciseDesk) -> np.ndarray:
+    """Where the middle of the bottle really is (3,), in the world."""
+    entries = json.loads((DEMO / "test/000001/scene_gt.json").read_text())[str(desk.frame_info["image_id"])]
+    truth = next(entry for entry in entries if entry["obj_id"] == BOTTLE)
+    T_camera_object = pose.from_rotation_translation(
+        np.reshape(truth["cam_R_m2c"], (3, 3)), np.array(truth["cam_t_m2c"]) / 1000
+    )
+    return pose.apply(desk.T_world_camera @ T_camera_object, MODEL.centre)
+
+
+@pytest.fixture
+def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> PreciseDesk:
+    """A new operator before the bottle of the first scene."""
+    name = re.sub(r"\W", "-", request.node.name)[:60]
+    return PreciseDesk(open_page(server.new_link(name)), server, "bottle")
+
+
+def motion(event: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Change of the object's origin, and of its rotation, in the world."""
+    before, after = np.array(event["T_before"]), np.array(event["T_after"])
+    return after[:3, 3] - before[:3, 3], after[:3, :3] @ before[:3, :3].T
+
+
+def test_keys_nudge_in_three_steps_and_three_frames(desk: PreciseDesk) -> None:
+    page = desk.page
+    page.locator("#precision summary").click()
+    T = desk.pose
+    right = desk.T_world_camera[:3, 0]  # the first view is the sensor's
+    for key, step in (("1", 0.0005), ("3", 0.01), ("2", 0.002)):
+        page.keyboard.press(key)
+        event = desk.press("l")
+        assert event["detail"] == {"technique": "nudge"}
+        assert motion(event)[0] == pytest.approx(step * right, abs=1e-5)
+    expect(page.locator("[data-step='1']")).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("x")
+    expect(page.locator("[data-axes='object']")).to_have_attribute("aria-pressed", "true")
+    assert motion(desk.press("i"))[0] == pytest.approx(0.002 * T[:3, 1], abs=1e-9)
+    page.locator("[data-axes='world']").click()
+    assert motion(desk.press("u"))[0] == pytest.approx([0, 0, -0.002], abs=1e-9)
+    turned = desk.press("Shift+o")
+    assert motion(turned)[1] == pytest.approx(pose.exp([0, 0, 0, 0, 0, np.radians(2)])[:3, :3])
+    assert np.allclose(desk.press("Shift+u")["T_after"], turned["T_before"])
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.allclose(desk.pose, turned["T_after"])
+    take_picture(page, "label-precision")
+    page.emulate_media(color_scheme="dark")
+    take_picture(page, "label-precision-dark")
+    page.reload()
+    expect(page.locator("#precision")).to_have_attribute("open", "")
+    expect(page.locator("[data-axes='world']")).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_key_held_down_goes_on_and_overtakes_nothing(desk: PreciseDesk) -> None:
+    page = desk.page
+    T = desk.pose
+    page.keyboard.press("x")
+    for _ in range(12):  # as the keyboard repeats it
+        page.keyboard.down("o")
+    page.keyboard.up("o")
+    page.wait_for_function(
+        "async ([url, z]) => Math.abs((await (await fetch(url)).json()).T_world_object[2][3] - z) < 1e-9",
+        arg=[desk.url, float((T @ pose.exp([0, 0, 12 * 0.002, 0, 0, 0]))[2, 3])],
+    )
+    assert desk.pose == pytest.approx(T @ pose.exp([0, 0, 0.024, 0, 0, 0]))
+
+
+def test_quarter_turns_and_flips_keep_the_middle(desk: PreciseDesk) -> None:
+    page = desk.page
+    T = desk.pose
+    page.keyboard.press("x")
+    for _ in range(4):
+        event = desk.press("Alt+l")
+        assert (event["detail"]["technique"], event["dof"]) == ("turn", ["rx"])
+    assert desk.pose == pytest.approx(T, abs=1e-9)
+    for _ in range(2):
+        assert desk.press("Alt+Shift+O")["detail"]["technique"] == "flip"
+    assert desk.pose == pytest.approx(T, abs=1e-9)
+    page.locator("#precision summary").click()
+    by_button = desk.change(lambda: page.get_by_role("button", name="Turn by 90 degrees about z").click())
+    assert by_button["dof"] == ["rz"]
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    flipped = desk.change(lambda: page.get_by_role("button", name="Flip about y").click())
+    assert (flipped["dof"], flipped["detail"]["technique"]) == (["ry"], "flip")
+
+
+def test_numbers_can_be_typed(desk: PreciseDesk) -> None:
+    page = desk.page
+    field = page.locator("[data-pose=x]")
+    expect(field).not_to_have_value("")
+    before = np.linalg.inv(desk.T_world_camera) @ desk.pose
+    field.click()
+    page.keyboard.type("77,5")
+    page.keyboard.press("Escape")
+    expect(field).to_have_value(f"{1000 * before[0, 3]:.1f}")
+    assert desk.moves() == 0
+    field.click()
+    page.keyboard.type("12.5")
+    event = desk.press("Enter")
+    assert event["detail"] == {"technique": "numbers"}
+    after = np.linalg.inv(desk.T_world_camera) @ desk.pose
+    assert after[:3, 3] == pytest.approx([0.0125, before[1, 3], before[2, 3]], abs=1e-9)
+    assert after[:3, :3] == pytest.approx(before[:3, :3])
+    expect(field).to_have_value("12.5")
+
+    vector = pose.log(after)[3:]
+    page.locator("[data-pose=ry]").click()
+    page.keyboard.type("-30")
+    desk.press("Enter")
+    turned = pose.log(np.linalg.inv(desk.T_world_camera) @ desk.pose)
+    assert turned[:3] == pytest.approx(after[:3, 3])
+    expected = pose.exp([0, 0, 0, vector[0], np.radians(-30), vector[2]])
+    assert pose.exp(turned)[:3, :3] == pytest.approx(expected[:3, :3])
+    page.locator("[data-pose=z]").click()
+    page.keyboard.type("near")
+    page.keyboard.press("Enter")
+    expect(page.locator("#message")).to_contain_text("no number")
+    assert desk.moves() == 2
+    assert desk.state["state"] == "open"  # Enter in a field submits nothing
+
+
+def test_the_gizmo_in_the_worlds_axes_drags_along_them(desk: PreciseDesk) -> None:
+    page = desk.page
+    T = desk.press("Shift+i")["T_after"]  # so that no axis of the object is one of the world
+    page.keyboard.press("g")
+    expect(page.locator("[data-gizmo=world]")).to_have_attribute("aria-pressed", "true")
+    desk.frame.wait_for_function(
+        "() => Math.abs(window.__viserMutable.nodeRefFromName['/object'].quaternion.w) > 0.9999"
+    )
+    desk.frame.evaluate(NEXT_PICTURE)
+    for handle, amount, expected in (("tz", 0.03, {"tz"}), ("rz", 0.3, {"rz"}), ("tx", 0.03, {"tx"})):
+        event = desk.drag(handle, amount)
+        assert (set(event["dof"]), event["detail"]["axes"]) == (expected, "world")
+        desk.frame.wait_for_function(
+            "() => Math.abs(window.__viserMutable.nodeRefFromName['/object'].quaternion.w) > 0.9999"
+        )
+    assert desk.pose[:3, 2] == pytest.approx(np.array(T)[:3, 2], abs=0.35)
+    take_picture(page, "label-gizmo-world")
+
+
+def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None:
+    page = desk.page
+    page.keyboard.press("Shift+P")
+    desk.events("set_pose")
+    T = desk.pose
+    seen = {}
+    before = desk.camera
+    for key, name in (("6", "top"), ("7", "front"), ("8", "side"), ("9", "left"), ("4", "object")):
+        page.keyboard.press(key)
+        seen[name] = before = desk.wait_for_camera(before)
+        take_picture(page, f"label-view-{name}")
+        middle = pixel(page, desk.frame, np.zeros(3)) - pixel_of_middle(page)
+        assert np.abs(middle).max() < 5, name
+    assert np.degrees(pose.rotation_angle(seen["top"][:3, :3].T @ seen["front"][:3, :3])) == pytest.approx(
+        89, abs=1
+    )
+    assert np.degrees(pose.rotation_angle(seen["side"][:3, :3].T @ seen["left"][:3, :3])) == pytest.approx(
+        30, abs=0.5
+    )
+    page.locator("[data-look=sensor]").click()
+    desk.wait_for_camera(before)
+    assert np.array_equal(desk.pose, T)
+    size = desk.scale
+    start = pixel(page, desk.frame, np.array([0.9 * size, 0, 0]))
+    page.mouse.move(*(start - 2))
+    page.mouse.move(*start)
+    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    page.mouse.down()
+    page.mouse.move(*(start + 4))
+    page.mouse.move(*(start + 8))
+    expect(page.locator("[data-look=top]")).to_be_disabled()
+    still = desk.camera
+    page.keyboard.press("6")
+    page.mouse.move(*(start + 12))
+    page.mouse.up()
+    desk.events("drag")
+    desk.frame.evaluate(NEXT_PICTURE)
+    assert np.array_equal(desk.camera, still)
+
+
+def pixel_of_middle(page: Page) -> np.ndarray:
+    box = page.locator("#view").bounding_box()
+    assert box is not None
+    return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+
+
+def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
+    page = desk.page
+    truth = true_centre(desk)
+    info = desk.frame_info["intrinsics"]
+    T = desk.pose
+    page.keyboard.press("p")
+    expect(page.locator("#place-mode")).to_be_visible()
+    take_picture(page, "label-place")
+    page.keyboard.press("Escape")
+    expect(page.locator("#place-mode")).to_be_hidden()
+    page.locator("#place").click()
+    box = page.locator("#color").bounding_box()
+    assert box is not None
+    x, y, z = pose.apply(pose.inverse(desk.T_world_camera), truth)
+    width, height = desk.frame_info["width"], desk.frame_info["height"]
+    scale = min(box["width"] / width, box["height"] / height)
+    column, row = info["fx"] * x / z + info["cx"] + 0.5, info["fy"] * y / z + info["cy"] + 0.5
+    left, top = (box["width"] - scale * width) / 2, (box["height"] - scale * height) / 2
+    at = box["x"] + left + scale * column, box["y"] + top + scale * row
+    event = desk.change(lambda: page.mouse.click(*at))
+    assert event["detail"] == {"technique": "place"}
+    expect(page.locator("#place-mode")).to_be_hidden()
+    assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
+    assert np.linalg.norm(pose.apply(desk.pose, MODEL.centre) - truth) < 0.05
+    take_picture(page, "label-placed")
+
+
+def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: PreciseDesk) -> None:
+    page = desk.page
+    T = desk.pose
+    page.keyboard.press("p")
+    stage = page.locator("#view").bounding_box()
+    assert stage is not None
+    page.mouse.click(stage["x"] + 3, stage["y"] + 3)
+    expect(page.locator("#message")).to_contain_text("no point of the cloud")
+    expect(page.locator("#place-mode")).to_be_visible()
+    where = np.array([stage["x"] + 0.42 * stage["width"], stage["y"] + 0.55 * stage["height"]])
+    event = desk.change(lambda: page.mouse.click(*where))
+    assert event["detail"] == {"technique": "place"}
+    assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
+    expect(page.locator("#place-mode")).to_be_hidden()
+    desk.frame.wait_for_function(
+        "x => Math.abs(window.__viserMutable.nodeRefFromName['/object'].position.x - x) < 1e-4",
+        arg=float(pose.apply(desk.pose, MODEL.centre)[0]),
+    )
+    desk.frame.evaluate(NEXT_PICTURE)
+    assert np.abs(pixel(page, desk.frame, np.zeros(3)) - where).max() < 60
+    page.keyboard.press("?")
+    take_picture(page, "label-keys-precision")
