@@ -24,16 +24,20 @@ PARTICLE_TEMPERATURE = 0.03
 """Difference of Eq. 5 between two modes of the particle filter that counts as one unit of log-odds."""
 
 
-def progress(search: Search, iteration: int, iterations: int, poses: Array32) -> SnapStep:
+def progress(
+    search: Search, iteration: int, iterations: int, poses: Array32, score: float, counts: Array
+) -> SnapStep:
     """A step with the hypotheses alive, (N, 3, 4), the one judged best first; its confidence takes that one's
     mode for the only.
+
+    Args:
+        score, counts: what the evidence says of the best.
     """
-    counts = search.evidence(poses[:1])
     return SnapStep(
         iteration,
         iterations,
         search.problem.uncentred(from_rows(poses[:1])[0]),
-        confidence(1.0, _score(search, poses[:1], counts), counts[0], search.problem.config.confidence),
+        confidence(1.0, score, counts, search.problem.config.confidence),
         search.problem.uncentred_particles(poses),
     )
 
@@ -43,8 +47,7 @@ def verdict(search: Search, iteration: int, candidates: Array32, judgement: Judg
     first.
     """
     temperature = search.problem.config.confidence.temperature
-    winner = judgement.winner
-    score, counts = float(judgement.scores[winner]), judgement.counts[winner]
+    winner, (score, counts) = judgement.winner, judgement.of_winner
     if winner > 0:
         candidates = candidates.copy()
         T, hessian = from_rows(candidates[[winner]])[0], search.hessian(candidates[winner])
@@ -57,17 +60,20 @@ def certainty(search: Search, candidates: Array32, judgement: Judgement) -> floa
     config = search.problem.config.confidence
     scores = judgement.scores / config.temperature
     _, masses = grouped(candidates, judgement.winner, scores, search.problem.model, config)
-    score = float(judgement.scores[judgement.winner])
-    return confidence(float(masses[0]), score, judgement.counts[judgement.winner], config)
+    return confidence(float(masses[0]), *judgement.of_winner, config)
 
 
 def outcome(search: Search, iteration: int, particles: Array32, log_weights: Array) -> SnapStep:
     """The last step of the particle filter: Eq. 2 over its particles (N, 3, 4), best first."""
     kept = distinct(particles, -np.arange(len(particles), dtype=np.float32), 24, 0.003, 0.05)
     log_odds = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
-    counts = search.evidence(particles[:1])
-    score = _score(search, particles[:1], counts)
-    return _conclusion(search, iteration, particles[kept], 0, log_odds, score, counts[0])
+    return _conclusion(search, iteration, particles[kept], 0, log_odds, *judged(search, particles[0]))
+
+
+def judged(search: Search, T: Array32) -> tuple[float, Array]:
+    """Score and counts (COUNT,) of a pose (3, 4)."""
+    counts, tails = search.evidence(T[None]), heavy_tails(T[None], search.problem.prior)
+    return float(scores(counts, tails, search.problem.config.selection)[0]), counts[0]
 
 
 def nothing_seen(search: Search, iteration: int) -> SnapStep:
@@ -97,12 +103,6 @@ def _conclusion(
     modes, masses = grouped(candidates, winner, log_odds, search.problem.model, config)
     belief = confidence(float(masses[0]), score, counts, config)
     return _final(search, iteration, candidates[modes], masses, belief, True)
-
-
-def _score(search: Search, poses: Array32, counts: Array) -> float:
-    """Log-odds of one pose (1, 3, 4) by its evidence (1, COUNT)."""
-    tails = heavy_tails(poses, search.problem.prior)
-    return float(scores(counts, tails, search.problem.config.selection)[0])
 
 
 def _final(

@@ -32,6 +32,11 @@ class Judgement:
     counts: Array
     """(N, evidence.COUNT), pixels of each class over the mean silhouette area at the start's depth."""
 
+    @property
+    def of_winner(self) -> tuple[float, Array]:
+        """Its score and its counts (evidence.COUNT,)."""
+        return float(self.scores[self.winner]), self.counts[self.winner]
+
 
 def judge(candidates: Array32, counts: Array, near: int, prior: Prior, config: SelectionConfig) -> Judgement:
     """Choose among poses (N, 3, 4): the start first, then `near` polishes of it, then the modes found

@@ -21,7 +21,7 @@ from registration_core.object_model import ObjectModel
 from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
-from registration_core.report import certainty, nothing_seen, outcome, progress, verdict
+from registration_core.report import certainty, judged, nothing_seen, outcome, progress, verdict
 from registration_core.search import Search
 from registration_core.seeding import seed_of
 from registration_core.selection import is_settled, judge
@@ -95,18 +95,18 @@ def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
     if is_settled(judgement, candidates, config.selection):
         yield verdict(search, 1, candidates, judgement)
         return
-    iteration, best = 1, candidates[[judgement.winner]]
-    yield progress(search, iteration, iterations, best)
+    iteration, best, known = 1, candidates[[judgement.winner]], judgement.of_winner
+    yield progress(search, iteration, iterations, best, *known)
     for one in config.rounds:
         if certainty(search, candidates, judgement) > one.doubt:
             continue
         for poses in search.round(one.share, one.widening):
             iteration += 1
-            yield progress(search, iteration, iterations, np.concatenate([best, poses]))
+            yield progress(search, iteration, iterations, np.concatenate([best, poses]), *known)
         candidates = np.concatenate([candidates, poses])
         counts = np.concatenate([counts, search.evidence(poses)])
         judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
-        best = candidates[[judgement.winner]]
+        best, known = candidates[[judgement.winner]], judgement.of_winner
     yield verdict(search, iteration + 1, candidates, judgement)
 
 
@@ -127,6 +127,6 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
         order = np.argsort(-particles.log_weights, kind="stable")
         ranked = to_rows(particles.poses[order])
         if iteration < config.iterations:
-            yield progress(search, iteration, config.iterations, ranked)
+            yield progress(search, iteration, config.iterations, ranked, *judged(search, ranked[0]))
         else:
             yield outcome(search, iteration, ranked, particles.log_weights[order])

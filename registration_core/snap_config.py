@@ -225,7 +225,7 @@ class RoundConfig:
 DEFAULT_ROUNDS = (
     RoundConfig(0.3, 1.0, 1.0),
     RoundConfig(0.5, 1.4, 0.95),
-    RoundConfig(0.6, 1.6, 0.6),
+    RoundConfig(0.5, 1.6, 0.6),
     RoundConfig(1.0, 1.6, 0.2),
 )
 
