@@ -90,11 +90,12 @@ class SceneView:
         The page turns the gizmo with what it drags; a gizmo in the world's axes gets its rotation back here,
         and the mesh, which hangs on it, the rotation that the gizmo had gathered.
         """
-        rotation = T_world_object[:3, :3] if gizmo_axes == "object" else np.eye(3)
-        T_world_gizmo = pose.from_rotation_translation(
-            rotation, pose.apply(T_world_object, self._model.centre)
-        )
-        self._T_gizmo_object = pose.inverse(T_world_gizmo) @ T_world_object
+        rotation = T_world_object[:3, :3]
+        of_gizmo, of_mesh = (rotation, np.eye(3)) if gizmo_axes == "object" else (np.eye(3), rotation)
+        centre = self._model.centre
+        T_world_gizmo = pose.from_rotation_translation(of_gizmo, pose.apply(T_world_object, centre))
+        # Not by the inverse of the one times the other: what rounding leaves would double with every drag.
+        self._T_gizmo_object = pose.from_rotation_translation(of_mesh, -of_mesh @ centre)
         with self._server.atomic():
             self._gizmo.position, self._gizmo.wxyz = _to_viser(T_world_gizmo)
             _, self._mesh.wxyz = _to_viser(self._T_gizmo_object)
