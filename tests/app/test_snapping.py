@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 
 import dask
@@ -159,9 +160,15 @@ def test_cancelling_one_of_many_lets_the_next_begin(snapper, model):
     wait_until(lambda: busy(snapper) == 0, "the workers to stop")
 
 
-def test_of_those_that_wait_the_urgent_goes_first(snapper, model):
-    running = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
-    assert all(outcome.moved.wait(LONGEST) for outcome, _ in running)
+def test_of_those_that_wait_for_a_worker_the_urgent_goes_first(tmp_path, model):
+    with closing(Snapper("", 1, tmp_path)) as alone:
+        alone.wait_until_ready()
+        check_that_the_urgent_goes_first(alone, model)
+
+
+def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> None:
+    running, cancel = request(snapper, new_job(model, snapper.topic, SLOW), model)
+    assert running.moved.wait(LONGEST)
     order: list[str] = []
     told = Outcome()
 
@@ -177,11 +184,9 @@ def test_of_those_that_wait_the_urgent_goes_first(snapper, model):
         job = new_job(model)
         snapper.request(job, model, told.on_progress, note(name), priority)
         wait_until(lambda job=job: snapper._pending[job.snap_id].future, "the snap to be handed over")
-    running[0][1]()
+    cancel()
     assert isinstance(result_of(told), JobResult)
-    running[1][1]()
     assert order == ["asked for", "live"] and told.shares == []
-    wait_until(lambda: busy(snapper) == 0, "the workers to stop")
 
 
 def test_an_object_that_no_worker_knows_is_sent_along(snapper):
