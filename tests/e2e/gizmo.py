@@ -9,6 +9,8 @@ import numpy as np
 from playwright.sync_api import Frame, Page
 
 GIZMO = "/object"
+NODES = [GIZMO, "/cloud"]
+"""What every view shows."""
 AXES = {"x": 0, "y": 1, "z": 2}
 ARROW, PLANE, ARC = 0.9, 0.255, 0.65
 """Where arrows, squares and arcs are grasped, as shares of the gizmo's scale."""
@@ -33,6 +35,15 @@ STANDS_STILL = """() => new Promise(done => {
   }, 100);
 })"""
 """Resolves when the camera no longer moves; closes the notice on software rendering, which swallows drags."""
+
+
+DRAWN = """names => names.every(name => {
+  const node = window.__viserMutable?.nodeRefFromName[name];
+  return node && !node.userData.isOld;
+})"""
+CALL_OLD = """names => {
+  for (const name of names) window.__viserMutable.nodeRefFromName[name].userData.isOld = true;
+}"""
 
 
 @dataclass(frozen=True)
@@ -73,10 +84,14 @@ def view_frame(page: Page) -> Frame:
     assert element is not None
     frame = element.content_frame()
     assert frame is not None
-    frame.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name]", arg=GIZMO)
-    frame.wait_for_function("name => window.__viserMutable?.nodeRefFromName[name]", arg="/cloud")
+    frame.wait_for_function(DRAWN, arg=NODES)
     frame.evaluate(STANDS_STILL)
     return frame
+
+
+def expect_new_view(frame: Frame) -> None:
+    """From now on, what the view shows counts only once it was drawn anew, as after a lost connection."""
+    frame.evaluate(CALL_OLD, NODES)
 
 
 def pixel(page: Page, frame: Frame, local: np.ndarray) -> np.ndarray:

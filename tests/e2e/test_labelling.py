@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from app.tables import Condition
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, drag, view_frame
+from tests.e2e.gizmo import Handle, drag, expect_new_view, view_frame
 from tests.processes import Server, command_line, descendants, serving
 
 pytestmark = pytest.mark.e2e
@@ -214,6 +214,7 @@ def test_the_page_goes_on_after_the_server_was_killed(
         desk = Desk(open_page(server.sign_in_link), server)
         desk.drag("tx", 0.02)
         kept = desk.pose
+        expect_new_view(desk.frame)
         server.kill()
     expect(desk.page.locator("#connection")).to_be_visible(timeout=20_000)
     take_picture(desk.page, "label-connection-lost")
