@@ -12,7 +12,18 @@ from pathlib import Path
 from rich.console import Console
 
 from app.config import PROJECT
-from benchmarks import ablation, commits, load, memory, open_task, registration, snap, startup
+from benchmarks import (
+    ablation,
+    commits,
+    live,
+    load,
+    memory,
+    open_task,
+    registration,
+    snap,
+    startup,
+    techniques,
+)
 from benchmarks.figures import Figure, table
 
 BENCHMARKS = {
@@ -21,7 +32,9 @@ BENCHMARKS = {
     "snap": snap,
     "commits": commits,
     "memory": memory,
+    "live": live,
     "load": load,
+    "techniques": techniques,
     "registration": registration,
     "ablation": ablation,
 }

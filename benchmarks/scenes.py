@@ -10,7 +10,7 @@ from sqlalchemy.orm import joinedload
 
 from app.scene_data import SceneData
 from app.storage import FileStore
-from app.tables import Task
+from app.tables import Frame, Scene, Task
 from benchmarks.server import database_of, settings_of
 from registration_core import ObjectModel, bop_writer, pose
 from registration_core.procedural_objects import demo_objects
@@ -33,7 +33,10 @@ class KnownTask:
 
     id: int
     object_id: int
+    dataset: str
+    obj_id: int
     model: ObjectModel
+    frame: Frame
     T_world_object: Array
     """(4, 4), the truth."""
 
@@ -46,10 +49,24 @@ def known_tasks(state_dir: Path) -> list[KnownTask]:
     """The tasks of a state directory, in the order of their numbers."""
     data = SceneData(FileStore(settings_of(state_dir).files_dir))
     with database_of(state_dir) as database, database.read() as session:
-        rows = session.scalars(select(Task).options(joinedload(Task.object)).order_by(Task.id)).all()
+        parts = (
+            joinedload(Task.object),
+            joinedload(Task.scene).joinedload(Scene.dataset),
+            joinedload(Task.frame),
+        )
+        rows = session.scalars(select(Task).options(*parts).order_by(Task.id)).all()
         return [
-            KnownTask(row.id, row.object_id, data.model(row.object), np.array(row.T_world_object_reference))
+            KnownTask(
+                id=row.id,
+                object_id=row.object_id,
+                dataset=row.scene.dataset.name,
+                obj_id=row.object.obj_id,
+                model=data.model(row.object),
+                frame=row.frame,
+                T_world_object=np.array(row.T_world_object_reference),
+            )
             for row in rows
+            if row.T_world_object_reference is not None
         ]
 
 

@@ -14,7 +14,7 @@ from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running
 from registration_core import pose_error
 
 TITLE = "Snap on the demo scenes: from POST .../snaps to the result on the stream"
-TARGET = Target(0.3)
+TARGET = Target(0.15)
 CANCEL_TARGET = Target(0.2)
 RIGHT = 0.1
 """Share of the diameter up to which ADD-S is called right."""

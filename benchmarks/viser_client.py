@@ -1,6 +1,7 @@
 """The 3-D view of a labelling page without a browser, for many at once in one thread."""
 
 import asyncio
+import time
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
@@ -70,12 +71,18 @@ class ViewClient:
         async with asyncio.timeout(seconds):
             await self._loaded.wait()
 
-    async def drag(self, T_world_gizmo: Sequence[Array]) -> None:
-        """Take the gizmo, move it through these poses (4, 4) as quickly as a page does, and let go."""
+    async def drag(self, T_world_gizmo: Sequence[Array]) -> list[float]:
+        """Take the gizmo, move it through these poses (4, 4) as quickly as a page does, and let go.
+
+        Returns:
+            When each pose was sent, by `time.perf_counter()`.
+        """
+        sent = []
         owner = self._nodes[GIZMO].get("owner", "")
         await self.send(type="TransformControlsDragStartMessage", name=GIZMO, owner=owner)
         for T in T_world_gizmo:
             await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
+            sent.append(time.perf_counter())
             await self.send(
                 type="TransformControlsUpdateMessage",
                 name=GIZMO,
@@ -84,6 +91,7 @@ class ViewClient:
                 position=T[:3, 3].tolist(),
             )
         await self.send(type="TransformControlsDragEndMessage", name=GIZMO, owner=owner)
+        return sent
 
     async def send(self, **message: object) -> None:
         """Send one message as a page does."""

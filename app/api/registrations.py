@@ -55,6 +55,7 @@ class OfferOut(BaseModel):
 class LiveOut(BaseModel):
     """Where a snap would land now."""
 
+    T_world_object_start: Pose = Field(description="The pose that it would start from.")
     T_world_object: Pose
     confidence: float
 
@@ -287,7 +288,11 @@ def _live_out(state: SessionState) -> LiveOut | None:
     live = state.live
     if live is None:
         return None
-    return LiveOut(T_world_object=live.T_world_object.tolist(), confidence=live.confidence)
+    return LiveOut(
+        T_world_object_start=live.T_world_object_start.tolist(),
+        T_world_object=live.T_world_object.tolist(),
+        confidence=live.confidence,
+    )
 
 
 def _event_out(row: Event) -> EventOut:

@@ -71,8 +71,13 @@ class LiveSnap:
         if isinstance(outcome, SnapFailure):
             self.found = None
         else:
-            offer = Offer(order.snap_id, outcome.T_world_object, outcome.estimate.confidence, quiet=True)
+            offer = _offer(order, outcome)
             self.found = Look(order, outcome, offer)
+
+
+def _offer(order: SnapOrder, result: SnapResult) -> Offer:
+    confidence = result.estimate.confidence
+    return Offer(order.snap_id, order.T_world_object, result.T_world_object, confidence, quiet=True)
 
 
 def _nothing() -> None:

@@ -228,7 +228,9 @@ class Machine:
             self._taken_over += [result.T_world_object] if unasked else []
         else:
             self._track.record(event, row)
-            self.offer = Offer(order.snap_id, result.T_world_object, estimate.confidence, quiet=unasked)
+            self.offer = Offer(
+                order.snap_id, order.T_world_object, result.T_world_object, estimate.confidence, quiet=unasked
+            )
         self.status = replace(self.status, state="done", progress=1.0)
 
     def _may_take_over(self, result: SnapResult) -> bool:

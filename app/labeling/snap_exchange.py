@@ -80,6 +80,8 @@ class Offer:
     """An estimate that waits for the operator's word."""
 
     snap_id: str
+    T_world_object_start: Array
+    """From where the machine looked."""
     T_world_object: Array
     confidence: float
     quiet: bool = False
