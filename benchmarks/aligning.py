@@ -1,6 +1,5 @@
 """One scripted operator aligning one object: every technique, with what it takes."""
 
-import asyncio
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
@@ -29,8 +28,8 @@ POINTING = 0.004
 class Alignment:
     """One operator before one object; `actions` and `seconds` grow with what it does.
 
-    A drag, a click and a key are one action each. Seconds are those that the scripted hand takes by its
-    model, and those that it really had to wait for the application.
+    A drag, a click, a double click and a key are one action each. Seconds are those that the scripted hand
+    takes by its model, and those that it really had to wait for the application.
     """
 
     operator: Operator
@@ -156,19 +155,14 @@ async def by_live_snap(work: Alignment) -> None:
 
 
 async def by_click_and_snap(work: Alignment) -> None:
-    """The key for placing, a click on the object in the image, and a snap; then as with the gizmo."""
+    """A double click on the object in the image, and a snap; then as with the gizmo."""
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
     x, y, z = pose.apply(T_camera_object, work.model.centre) + POINTING * work.rng.normal(size=3)
     frame = work.task.frame
     pixel = {"column": frame.cx + frame.fx * x / z, "row": frame.cy + frame.fy * y / z}
-    await work.press(_nothing)
     await work.click(lambda: work.post("place", {"frame_id": frame.id, **pixel}))
     if not work.is_aligned(await work.snap()):
         await by_gizmo_and_snap(work)
-
-
-async def _nothing() -> None:
-    await asyncio.sleep(0)
 
 
 TECHNIQUES: Mapping[str, Callable[[Alignment], Awaitable[None]]] = {

@@ -1,4 +1,4 @@
-/** Placing the object by a click on the cloud or the colour image. */
+/** Placing the object by a double click on the cloud or the colour image, or by a click after a key. */
 
 import { post } from "../api.js";
 import { byId } from "../dom.js";
@@ -21,9 +21,16 @@ export function placePart(page) {
   frame.addEventListener("pointerdown", (event) => (pressedAt = event));
   frame.addEventListener("click", (event) => {
     if (!on || isDrag(event) || event.target.closest("button")) return;
+    placeInImage(event);
+  });
+  frame.addEventListener("dblclick", (event) => {
+    if (page.canMove() && !event.target.closest("button")) placeInImage(event);
+  });
+
+  function placeInImage(event) {
     const pixel = pixelAt(event);
     if (pixel) place(pixel);
-  });
+  }
 
   const isDrag = ({ clientX, clientY }) =>
     Math.hypot(clientX - pressedAt.clientX, clientY - pressedAt.clientY) > LARGEST_CLICK;
@@ -66,10 +73,15 @@ export function placePart(page) {
       (event) => {
         if (!on) return;
         event.stopPropagation();
-        place({ across: event.clientX / view.innerWidth, down: event.clientY / view.innerHeight });
+        placeInView(event);
       },
       options,
     );
+    view.addEventListener("dblclick", (event) => page.canMove() && placeInView(event), options);
+
+    function placeInView({ clientX, clientY }) {
+      place({ across: clientX / view.innerWidth, down: clientY / view.innerHeight });
+    }
   }
 
   /** The frame's pixel under the pointer, or null beside the picture, however it is scaled or shifted. */

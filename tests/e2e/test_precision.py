@@ -250,6 +250,11 @@ def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None
     assert np.array_equal(desk.camera, still)
 
 
+def near(T: np.ndarray) -> object:
+    """The same place, but for the planes that are drawn at random."""
+    return pytest.approx(np.array(T), abs=0.005)
+
+
 def pixel_of_middle(page: Page) -> np.ndarray:
     box = page.locator("#view").bounding_box()
     assert box is not None
@@ -277,6 +282,10 @@ def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
     at = box["x"] + left + scale * column, box["y"] + top + scale * row
     event = desk.change(lambda: page.mouse.click(*at))
     assert event["detail"] == {"technique": "place"}
+    placed = desk.pose
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.array(desk.change(lambda: page.mouse.dblclick(*at))["T_after"]) == near(placed)
     expect(page.locator("#place-mode")).to_be_hidden()
     assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
     assert np.linalg.norm(pose.apply(desk.pose, MODEL.centre) - truth) < 0.05
@@ -295,6 +304,9 @@ def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: Prec
     where = np.array([stage["x"] + 0.42 * stage["width"], stage["y"] + 0.55 * stage["height"]])
     event = desk.change(lambda: page.mouse.click(*where))
     assert event["detail"] == {"technique": "place"}
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.array(desk.change(lambda: page.mouse.dblclick(*where))["T_after"]) == near(event["T_after"])
     assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
     expect(page.locator("#place-mode")).to_be_hidden()
     desk.frame.wait_for_function(
