@@ -12,7 +12,7 @@ from pathlib import Path
 from rich.console import Console
 
 from app.config import PROJECT
-from benchmarks import ablation, commits, load, memory, open_task, registration, snap, startup
+from benchmarks import ablation, commits, known, load, memory, open_task, registration, snap, startup
 from benchmarks.figures import Figure, table
 
 BENCHMARKS = {
@@ -24,6 +24,7 @@ BENCHMARKS = {
     "load": load,
     "registration": registration,
     "ablation": ablation,
+    "known": known,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""
