@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 import viser
 from scipy.spatial.transform import Rotation
 
@@ -11,7 +12,10 @@ from app.labeling.scene_things import Thing
 from registration_core import pose
 
 OPACITY = 0.75
+SHELL = 0.003
+"""Metres by which the mesh is drawn thicker: measured points would hide one that lies where it should."""
 LABEL_SCALE = 0.8
+"""Of the names."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +50,11 @@ class NeighbourView:
     def _draw(self, thing: Thing) -> _Shown:
         assert thing.known is not None
         model, T = thing.known.model, thing.known.T_world_object
-        mesh = self._server.scene.add_mesh_simple(
+        mesh = trimesh.Trimesh(model.vertices, model.faces)
+        handle = self._server.scene.add_mesh_simple(
             f"/neighbours/{thing.task_id}",
-            vertices=model.vertices.astype(np.float32),
-            faces=model.faces,
+            vertices=(mesh.vertices + SHELL * mesh.vertex_normals).astype(np.float32),
+            faces=mesh.faces,
             color=_rgb(thing.color),
             opacity=OPACITY,
             side="double",
@@ -65,7 +70,7 @@ class NeighbourView:
             font_screen_scale=LABEL_SCALE,
             anchor="center-center",
         )
-        return _Shown(thing, mesh, label)
+        return _Shown(thing, handle, label)
 
 
 def _is_same(drawn: Thing, wanted: Thing | None) -> bool:
