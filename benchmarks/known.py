@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 TITLE = "Snaps that know the other objects of the scene: MSSD < 5 % of the diameter"
 
-DIFFERENT, TWINS = "five different objects", "two of the same among five"
+DIFFERENT, TWINS = "five different objects", "two pairs of the same among five"
 SCENES, QUICK_SCENES, STARTS = 40, 1, 2
 """Of each kind; starts from each shell about each instance."""
 DISTRACTORS = 2

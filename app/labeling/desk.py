@@ -221,7 +221,10 @@ class Desk:
         with self._lock:
             seats = [seat for seat in self._seats.values() if seat.registration.task.scene_id == scene_id]
         for seat in seats:
-            seat.neighbours.renew()
+            try:
+                seat.neighbours.renew()
+            except Exception:  # what happened is on the disk, whoever cannot be told of it
+                logger.exception("registration %d was not told of its scene", seat.registration.id)
 
     def _request_snap(
         self,
