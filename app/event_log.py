@@ -15,6 +15,9 @@ from app.tables import EstimateRow, Event, Pose, Registration, utc_now
 BOOT_ID = uuid.uuid4().hex
 """Names this run of the server: monotonic seconds are comparable only within one run."""
 
+STATE_AFTER = {"submit": "submitted", "skip": "skipped", "reopen": "open"}
+"""Events that end a registration or begin it anew, and how it stands then."""
+
 
 @dataclass(frozen=True)
 class NewEvent:
@@ -44,7 +47,8 @@ class EventLog:
     ) -> Event:
         """Write one event, with the estimate it brings, in one durable transaction.
 
-        A `submit` event also closes the registration with its pose.
+        A `submit` event also closes the registration with its pose, a `skip` with its reason; a `reopen`
+        event takes both back.
         """
         with self._database.write() as session:
             last = session.scalar(
@@ -70,11 +74,13 @@ class EventLog:
             session.add(row)
             if estimate is not None:
                 session.add(estimate)
-            if event.kind == "submit":
+            if event.kind in STATE_AFTER:
                 registration = session.get_one(Registration, registration_id)
-                registration.state = "submitted"
-                registration.T_world_object = event.T_after
-                registration.submitted_at = row.utc
+                submitted = event.kind == "submit"
+                registration.state = STATE_AFTER[event.kind]
+                registration.T_world_object = event.T_after if submitted else None
+                registration.submitted_at = row.utc if submitted else None
+                registration.skip_reason = event.detail["reason"] if event.kind == "skip" else None
         return row
 
     def events(self, registration_id: int, after: int = 0, limit: int | None = None) -> Sequence[Event]:

@@ -14,8 +14,18 @@ from sqlalchemy import (
     String,
     TypeDecorator,
     UniqueConstraint,
+    column,
+    func,
+    select,
+    table,
 )
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy.orm import (
+    DeclarativeBase,
+    Mapped,
+    column_property,
+    mapped_column,
+    relationship,
+)
 
 Pose = list[list[float]]
 Condition = Literal["manual", "snap", "auto"]
@@ -135,6 +145,11 @@ class Frame(Base):
     scene: Mapped[Scene] = relationship(back_populates="frames")
 
 
+_same = table("tasks", column("scene_id"), column("object_id"), column("mode"), column("condition")).alias(
+    "same"
+)
+
+
 class Task(Base):
     """One instance of an object in a scene, to be registered under a mode and a condition."""
 
@@ -154,6 +169,19 @@ class Task(Base):
     object: Mapped[Object] = relationship()
     frame: Mapped[Frame] = relationship()
     registrations: Mapped[list["Registration"]] = relationship(back_populates="task")
+    instances: Mapped[int] = column_property(
+        select(func.count())
+        .select_from(_same)
+        .where(
+            _same.c.scene_id == scene_id,
+            _same.c.object_id == object_id,
+            _same.c.mode == mode,
+            _same.c.condition == condition,
+        )
+        .scalar_subquery(),
+        deferred=True,
+    )
+    """How often the object is asked for in the scene, in this mode and condition; has to be undeferred."""
 
 
 class Registration(Base):
@@ -166,6 +194,7 @@ class Registration(Base):
     user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
     state: Mapped[str] = mapped_column(String(20), default="open")
     T_world_object: Mapped[Pose | None]
+    skip_reason: Mapped[str | None] = mapped_column(String(20))
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     submitted_at: Mapped[datetime | None]
     task: Mapped[Task] = relationship(back_populates="registrations")
@@ -217,6 +246,7 @@ class EstimateRow(Base):
     seed: Mapped[int] = mapped_column(BigInteger)
     config: Mapped[dict[str, Any]]
     start_spread: Mapped[list[Any] | None]
+    known_objects: Mapped[list[Any] | None]
     version: Mapped[str] = mapped_column(String(40))
     hardware: Mapped[str] = mapped_column(String(200))
     seconds: Mapped[float] = mapped_column(Float)

@@ -48,6 +48,8 @@ class SnapJob:
     seed: int
     start_spread: tuple[float, float] | None
     """How far off T_camera_object may be, metres and radians; None where that is unknown."""
+    explained: NDArray[np.bool_] | None = None
+    """(H, W), the pixels of other objects whose pose is known; None where there are none."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,9 @@ def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = N
     reported = 0.0
     estimate = None
     rng = np.random.default_rng(job.seed)
-    steps = snap_steps(known, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread)
+    steps = snap_steps(
+        known, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread, job.explained
+    )
     for step in steps:
         if job.snap_id in _cancelled:
             raise SnapCancelledError(job.snap_id)

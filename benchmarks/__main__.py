@@ -15,6 +15,7 @@ from app.config import PROJECT
 from benchmarks import (
     ablation,
     commits,
+    known,
     live,
     load,
     memory,
@@ -37,6 +38,7 @@ BENCHMARKS = {
     "techniques": techniques,
     "registration": registration,
     "ablation": ablation,
+    "known": known,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""

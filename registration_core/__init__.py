@@ -5,6 +5,7 @@ from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Ambiguity, Estimate, Hypothesis, SnapStep, WorldEstimate
 from registration_core.global_search import propose
+from registration_core.known_objects import explained_pixels
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps
@@ -26,6 +27,7 @@ __all__ = [
     "Symmetries",
     "WorldEstimate",
     "as_symmetries",
+    "explained_pixels",
     "find_symmetries",
     "pose_from_correspondences",
     "propose",

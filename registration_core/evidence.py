@@ -5,6 +5,9 @@ A pixel inside the outline falls into a bin by how far behind the claimed surfac
 just outside tells whether the surface ends where the outline does. Counts are divided by one area for all
 candidates, so that a background which does not depend on the pose cancels and candidates of different
 outlines are compared on the union of their pixels.
+
+A pixel of a known object says nothing for or against what it hides, and never that a surface goes on; only a
+surface claimed clearly before it was seen through.
 """
 
 import numpy as np
@@ -34,6 +37,8 @@ RING = UNMEASURED + 1
 and clear; something in front; the same depth within 6, 15 and 40 mm; clear behind.
 """
 COUNT = RING + 8
+CONTINUING = (4, 5, 6)
+"""The classes by which the surface may go on."""
 
 MATCH = 0.006
 """Limit of agreement beside which the ring is counted, metres."""
@@ -81,11 +86,14 @@ def _count(poses, vertices, faces, both_sides, grid, counts):
             for column in range(first_column, end_column):
                 r, c = row - first_row, column - first_column
                 seen = float(grid.depth[row, column])
-                on_plane = grid.weight[row, column] < f4(0.5)
+                known = grid.known[row, column]
+                on_plane = grid.weight[row, column] < f4(0.5) and not known
                 if crop[r, c] > 0.0:
                     behind = seen - 1.0 / crop[r, c]
                     if seen <= 0.0:
                         count[UNMEASURED] += 1
+                    elif known and behind < MATCH:
+                        count[OFF_PLANE] += 1
                     elif on_plane:
                         count[ON_PLANE + _bin(behind, BEHIND_ON_PLANE)] += 1
                     else:
@@ -110,8 +118,11 @@ def _count_ring(grid, crop, row, column, first_row, first_column, seen, on_plane
         if r < 0 or c < 0 or r >= crop.shape[0] or c >= crop.shape[1] or crop[r, c] == 0.0:
             continue
         rim = 1.0 / crop[r, c]
-        if abs(grid.depth[row + dr, column + dc] - rim) < MATCH:
-            count[RING + _ring_class(seen, seen - rim, on_plane)] += 1
+        agrees = abs(grid.depth[row + dr, column + dc] - rim) < MATCH
+        if agrees and not grid.known[row + dr, column + dc]:
+            ring_class = _ring_class(seen, seen - rim, on_plane)
+            nothing_said = grid.known[row, column] and ring_class in CONTINUING
+            count[RING + (0 if nothing_said else ring_class)] += 1
         return
 
 

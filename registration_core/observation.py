@@ -31,11 +31,13 @@ class Grid(NamedTuple):
     normals: Array32
     """(3, H, W), towards the camera; 0 where unknown."""
     weight: Array32
-    """(H, W), how much a pixel counts."""
+    """(H, W), how much a match with a pixel counts."""
     fx: np.float32
     fy: np.float32
     cx: np.float32
     cy: np.float32
+    known: NDArray[np.bool_]
+    """(H, W), where a known object was seen: it hides what lies behind, and is no part of what is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class Observation:
 
     grid: Grid
     measured: int
-    """Pixels of the grid with depth within reach of the object."""
+    """Pixels of the grid with depth within reach of the object, but for those of known objects."""
 
 
 def window(
@@ -91,10 +93,15 @@ def observe(
     model: ViewpointModel,
     config: ObservationConfig,
     rng: np.random.Generator,
+    explained: NDArray[np.bool_] | None = None,
 ) -> Observation:
-    """Read the depth image (H, W), metres, around an object expected at `centre` (3,), camera axes."""
+    """Read the depth image (H, W), metres, around an object expected at `centre` (3,), camera axes.
+
+    Args:
+        explained: (H, W), the pixels of known objects; None where there are none.
+    """
     bounds = window(camera, centre, model.radius, config.reach)
-    return observe_region(depth, camera, bounds, float(centre[2]), model, config, rng)
+    return observe_region(depth, camera, bounds, float(centre[2]), model, config, rng, explained)
 
 
 def observe_region(
@@ -105,6 +112,7 @@ def observe_region(
     model: ViewpointModel,
     config: ObservationConfig,
     rng: np.random.Generator,
+    explained: NDArray[np.bool_] | None = None,
 ) -> Observation:
     """Read the part (left, top, right, bottom) of the depth image (H, W), metres, in which an object is about
     `distance` [m] off.
@@ -122,15 +130,28 @@ def observe_region(
     cy = f4((camera.cy - top - (block - 1) / 2) / block + 1)
     normals = np.zeros((3, *reduced.shape), np.float32)
     _fit_normals(reduced, fx, fy, cx, cy, config.normal_radius, f4(config.depth_gap), normals)
-    weight = np.ones_like(reduced)
-    grid = Grid(reduced, normals, weight, fx, fy, cx, cy)
-    plane = _find_plane(grid, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
+    weight, known = np.ones_like(reduced), np.zeros(reduced.shape, np.bool_)
+    if explained is not None:
+        known[1:-1, 1:-1] = _reduced_mask(explained[top:bottom, left:right], block)
+    grid = Grid(reduced, normals, weight, fx, fy, cx, cy, known)
+    unknown = grid._replace(depth=np.where(known, f4(0), reduced))
+    plane = _find_plane(unknown, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
     silhouette = model.mean_area * float(fx) * float(fy) / max(distance, NEAREST) ** 2
-    least = max(config.plane_share, config.plane_excess * silhouette / max(int(np.count_nonzero(reduced)), 1))
+    least = max(
+        config.plane_share, config.plane_excess * silhouette / max(int(np.count_nonzero(unknown.depth)), 1)
+    )
     if plane[4] > least:
         _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
+    weight[known] = f4(0)
     near = np.abs(reduced - distance) < model.radius + config.reach
-    return Observation(grid, int(np.count_nonzero(near & (reduced > 0))))
+    return Observation(grid, int(np.count_nonzero(near & (unknown.depth > 0))))
+
+
+def _reduced_mask(mask: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
+    """Blocks of which at least half is set."""
+    rows, columns = mask.shape[0] // block, mask.shape[1] // block
+    blocks = mask[: rows * block, : columns * block].reshape(rows, block, columns, block)
+    return 2 * blocks.sum(axis=(1, 3)) >= block * block
 
 
 @njit(**FAST)

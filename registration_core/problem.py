@@ -50,6 +50,8 @@ class Problem:
     search: Prior
     """The Gaussian that proposals are drawn from: `spread` times `config.spread.search`."""
     config: SnapConfig
+    explained: NDArray[np.bool_] | None = None
+    """(H, W), the pixels of known objects; None where there are none."""
 
     @property
     def spread(self) -> tuple[float, float]:
@@ -73,6 +75,7 @@ def checked_problem(
     T_camera_object: ArrayLike,
     config: SnapConfig,
     start_spread: tuple[float, float] | None,
+    explained: ArrayLike | None = None,
 ) -> Problem:
     """The inputs of `snap` as a Problem.
 
@@ -85,7 +88,8 @@ def checked_problem(
     start = centred(T, viewpoints.centre)
     check_in_view(viewpoints, camera, start)
     prior, search = _priors(start, config.spread, start_spread)
-    return Problem(viewpoints, image, camera, T, start, prior, search, config)
+    mask = None if explained is None else _checked_mask(explained, camera)
+    return Problem(viewpoints, image, camera, T, start, prior, search, config, mask)
 
 
 def region_of_interest(
@@ -133,6 +137,16 @@ def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
     if median > FARTHEST:
         raise ValueError(f"depth must be in metres; its median is {median:.6g}, which looks like millimetres")
     return image
+
+
+def _checked_mask(explained: ArrayLike, camera: Intrinsics) -> NDArray[np.bool_]:
+    mask = np.asarray(explained)
+    if mask.dtype != np.bool_ or mask.shape != (camera.height, camera.width):
+        raise ValueError(
+            f"explained must be booleans of the shape (height, width) of the camera,"
+            f" {(camera.height, camera.width)}; it has {mask.dtype} {mask.shape}"
+        )
+    return mask
 
 
 def check_in_view(model: ViewpointModel, camera: Intrinsics, start: Array) -> None:

@@ -36,6 +36,7 @@ def snap(
     config: SnapConfig | None = None,
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
+    explained: ArrayLike | None = None,
 ) -> Estimate:
     """Refine the operator's pose of an object against a depth image.
 
@@ -46,11 +47,13 @@ def snap(
         rng: the source of all randomness; fresh entropy where it is None. See `Estimate.seed`.
         start_spread: (metres, radians) by which the start may be off, from the last drag's size; None =
         unknown.
+        explained: (H, W) booleans, pixels that objects of known pose account for (`explained_pixels`): they
+        attract nothing, and hide what lies behind them.
 
     Raises:
         ValueError: naming the argument that is wrong, and how.
     """
-    for step in snap_steps(model, depth, camera, T_camera_object, config, rng, start_spread):
+    for step in snap_steps(model, depth, camera, T_camera_object, config, rng, start_spread, explained):
         if step.estimate is not None:
             return step.estimate
     raise AssertionError("the last step carries the estimate")
@@ -64,6 +67,7 @@ def snap_steps(
     config: SnapConfig | None = None,
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
+    explained: ArrayLike | None = None,
 ) -> Iterator[SnapStep]:
     """`snap` step by step, so that a caller can show progress and stop early; the last step has the estimate.
 
@@ -71,11 +75,12 @@ def snap_steps(
     """
     started = time.perf_counter()
     config = SnapConfig() if config is None else config
-    problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread)
+    problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread, explained)
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
     observation = observe(
         problem.depth, camera, problem.start[:3, 3], problem.model, config.observation, rng,
+        problem.explained,
     )  # fmt: skip
     search = Search(problem, observation, surface_of(problem.model), rng, seed, started)
     if observation.measured < config.observation.min_pixels:
@@ -113,8 +118,9 @@ def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
 def _filter_steps(search: Search) -> Iterator[SnapStep]:
     """The paper's method: importance resampling of particles weighed by Eq. 3 to 5."""
     problem, config = search.problem, search.problem.config.particle_filter
+    depth = problem.depth if problem.explained is None else np.where(problem.explained, 0.0, problem.depth)
     likelihood = RenderedLikelihood(
-        problem.model, problem.depth, problem.camera, problem.start[:3, 3],
+        problem.model, depth, problem.camera, problem.start[:3, 3],
         problem.config.observation.reach, config,
     )  # fmt: skip
     spread = Noise(*problem.spread)

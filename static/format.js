@@ -10,3 +10,8 @@ export function fileSize(bytes) {
   if (bytes < 1e6) return `${Math.ceil(bytes / 1e3)} kB`;
   return `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
 }
+
+/** "mug", or "mug #2" where the object is asked for several times. */
+export function taskName({ object, instance, instances }) {
+  return instances > 1 ? `${object.name} #${instance + 1}` : object.name;
+}

@@ -67,6 +67,7 @@ class RegistrationOut(BaseModel):
     task_id: int
     condition: str
     state: str
+    skip_reason: str | None
     frame_id: int
     T_world_object: Pose
     T_camera_object: Pose
@@ -103,6 +104,12 @@ class LiveChoice(BaseModel):
     """Whether the machine is to show where a snap would land, all the time."""
 
     on: bool
+
+
+class Skip(BaseModel):
+    """Why there is no pose."""
+
+    reason: Literal["not visible", "no depth", "wrong model", "ambiguous"]
 
 
 class EventOut(BaseModel):
@@ -179,6 +186,14 @@ _add_action("reset", LabelingSession.reset, "Put the object back to where it beg
 _add_action("accept", LabelingSession.accept, "Take the pose that the machine offers")
 _add_action("dismiss", LabelingSession.dismiss, "Decline the pose that the machine offers")
 _add_action("submit", LabelingSession.submit, "Finish with the present pose")
+_add_action("reopen", LabelingSession.reopen, "Go on with what was submitted or skipped")
+
+
+@router.post("/{registration_id}/skip")
+def skip(body: Skip, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    """Finish without a pose."""
+    seat.session.skip(identity.actor, body.reason)
+    return registration_out(seat)
 
 
 @router.get("/{registration_id}/events")
@@ -245,6 +260,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         task_id=seat.registration.task_id,
         condition=seat.registration.task.condition,
         state=state.state,
+        skip_reason=state.skip_reason,
         frame_id=state.frame_id,
         T_world_object=state.T_world_object.tolist(),
         T_camera_object=(pose.inverse(T_world_camera) @ state.T_world_object).tolist(),

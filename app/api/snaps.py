@@ -68,6 +68,14 @@ class AmbiguityOut(BaseModel):
     extent: float = Field(description="Radians or metres.")
 
 
+class KnownObjectOut(BaseModel):
+    """Another object, which hid what was behind it and attracted nothing."""
+
+    registration_id: int
+    object_id: int
+    T_world_object: Pose
+
+
 class EstimateOut(BaseModel):
     """What a snap found."""
 
@@ -83,6 +91,9 @@ class EstimateOut(BaseModel):
     seed: int
     config: dict[str, Any]
     start_spread: list[float] | None
+    known_objects: list[KnownObjectOut] | None = Field(
+        description="Objects of the scene that the snap knew; null where an older version did not say."
+    )
     version: str
     hardware: str
     seconds: float

@@ -6,7 +6,7 @@ import numpy as np
 from fastapi import APIRouter, HTTPException, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import ColumnElement, Select, select
-from sqlalchemy.orm import Session, joinedload, selectinload
+from sqlalchemy.orm import Session, joinedload, selectinload, undefer
 
 from app.api.dependencies import (
     AdminDep,
@@ -29,7 +29,7 @@ from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 
-TaskState = Literal["open", "in_progress", "submitted"]
+TaskState = Literal["open", "in_progress", "submitted", "skipped"]
 Mode = Literal["accurate", "quick"]
 
 
@@ -69,6 +69,7 @@ class OperatorRef(BaseModel):
 
     name: str
     state: str
+    skip_reason: str | None
 
 
 class TaskOut(BaseModel):
@@ -79,6 +80,8 @@ class TaskOut(BaseModel):
     scene: SceneRef
     object: ObjectRef
     instance: int
+    instances: int
+    """How often the object is asked for in this scene, in this mode and condition."""
     frame_id: int
     mode: str
     condition: str
@@ -187,6 +190,7 @@ def _tasks() -> Select[Task]:
         joinedload(Task.scene).joinedload(Scene.dataset),
         joinedload(Task.object),
         joinedload(Task.frame),
+        undefer(Task.instances),
         selectinload(Task.registrations).joinedload(Registration.user),
     )
 
@@ -199,16 +203,32 @@ def _task(session: Session, task_id: int) -> Task:
 
 
 def _is_in_state(state: TaskState) -> ColumnElement[bool]:
-    submitted = Task.registrations.any(Registration.state == "submitted")
-    if state == "submitted":
-        return submitted
-    if state == "in_progress":
-        return Task.registrations.any() & ~submitted
-    return ~Task.registrations.any()
+    """As `_state_of` tells of one task."""
+    begun, submitted, in_progress = (
+        Task.registrations.any(),
+        Task.registrations.any(Registration.state == "submitted"),
+        Task.registrations.any(Registration.state == "open"),
+    )
+    match state:
+        case "submitted":
+            return submitted
+        case "in_progress":
+            return in_progress & ~submitted
+        case "skipped":
+            return begun & ~in_progress & ~submitted
+        case "open":
+            return ~begun
+
+
+def _state_of(row: Task) -> TaskState:
+    """What has come furthest counts; skipped is only what everybody who began it skipped."""
+    states = {registration.state for registration in row.registrations}
+    if not states:
+        return "open"
+    return "submitted" if "submitted" in states else "in_progress" if "open" in states else "skipped"
 
 
 def _out(row: Task, user_id: int) -> TaskOut:
-    states = {registration.state for registration in row.registrations}
     mine = next((r.id for r in row.registrations if r.user_id == user_id), None)
     return TaskOut(
         id=row.id,
@@ -216,11 +236,14 @@ def _out(row: Task, user_id: int) -> TaskOut:
         scene=SceneRef(id=row.scene.id, label=row.scene.label),
         object=ObjectRef(id=row.object.id, obj_id=row.object.obj_id, name=row.object.name),
         instance=row.instance,
+        instances=row.instances,
         frame_id=row.frame_id,
         mode=row.mode,
         condition=row.condition,
-        state="submitted" if "submitted" in states else "in_progress" if states else "open",
-        operators=[OperatorRef(name=r.user.name, state=r.state) for r in row.registrations],
+        state=_state_of(row),
+        operators=[
+            OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason) for r in row.registrations
+        ],
         mine=mine,
         thumbnail_url=f"/api/tasks/{row.id}/thumbnail.jpg",
     )

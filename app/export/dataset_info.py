@@ -13,6 +13,7 @@ Lengths are in millimetres, cameras as in OpenCV (x right, y down, z forward).
 - {scenes} scenes, {images} images, {annotations} annotated object instances.
 - Left out: {left_out} images of scenes in which nothing is annotated.
 - Not annotated in the exported scenes: {instances_open} object instances that have a task.
+- Of these were skipped by those who looked for them: {skipped}.
 
 An object that lies in a scene and has no annotation is missing from `scene_gt.json` too.
 Images of one scene share one world where `scene_camera.json` has `cam_R_w2c` and `cam_t_w2c`.
@@ -44,6 +45,8 @@ def dataset_info(selection: Selection) -> str:
         annotations=len(annotations),
         left_out=selection.images_left_out,
         instances_open=selection.instances_open,
+        skipped=", ".join(f"{count} as {reason!r}" for reason, count in selection.instances_skipped)
+        or "none",
         objects="\n".join(
             f"| {found.obj_id} | {found.name} | {counts[found.obj_id]} |" for found in selection.objects
         ),

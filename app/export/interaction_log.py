@@ -26,6 +26,9 @@ MATRIX = pa.list_(pa.list_(pa.float64()))
 TIME = pa.timestamp("us", tz="UTC")
 JSON_TEXT = pa.string()
 
+LOOSE_FIELDS = ("detail", "hypotheses", "ambiguities", "config", "known_objects")
+"""Without a fixed shape."""
+
 CONTEXT_FIELDS = [
     ("registration_id", pa.int64()),
     ("task_id", pa.int64()),
@@ -74,6 +77,7 @@ ESTIMATES = pa.schema(
         ("seed", pa.int64()),
         ("config", JSON_TEXT),
         ("start_spread", pa.list_(pa.float64())),
+        ("known_objects", JSON_TEXT),
         ("version", pa.string()),
         ("hardware", pa.string()),
         ("seconds", pa.float64()),
@@ -104,7 +108,7 @@ def write_table(stem: Path, schema: pa.Schema, rows: Iterator[Record]) -> None:
 
 def parquet_row(row: Record, schema: pa.Schema) -> Record:
     """A record whose fields without a fixed shape are JSON texts."""
-    loose = {name for name in ("detail", "hypotheses", "ambiguities", "config") if name in schema.names}
+    loose = {name for name in LOOSE_FIELDS if name in schema.names}
     return row | {name: json.dumps(row[name], sort_keys=True) for name in loose}
 
 
@@ -194,6 +198,7 @@ def estimate_record(
         "seed": estimate.seed,
         "config": estimate.config,
         "start_spread": estimate.start_spread,
+        "known_objects": estimate.known_objects,
         "version": estimate.version,
         "hardware": estimate.hardware,
         "seconds": estimate.seconds,

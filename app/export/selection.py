@@ -1,5 +1,6 @@
 """What an export holds: the images of every scene with a submitted registration, and the poses kept."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -16,7 +17,7 @@ from registration_core import Intrinsics, Symmetries
 
 Array = NDArray[np.float64]
 
-SUBMITTED = "submitted"
+SUBMITTED, SKIPPED = "submitted", "skipped"
 ACCURATE = "accurate"
 
 
@@ -91,6 +92,8 @@ class Selection:
     """Images of scenes without a submitted registration."""
     instances_open: int
     """Object instances of the exported scenes that nobody submitted yet."""
+    instances_skipped: tuple[tuple[str, int], ...]
+    """How many of those somebody skipped, by reason; one for which people differ counts for each reason."""
 
     @property
     def annotations(self) -> list[Annotation]:
@@ -137,7 +140,24 @@ def select_dataset(session: Session, dataset_id: int) -> Selection:
         scenes,
         images_left_out=(images_in_all or 0) - sum(len(scene.images) for scene in scenes),
         instances_open=len(instances) - sum(map(len, annotations.values())),
+        instances_skipped=count_skipped(session, annotations),
     )
+
+
+def count_skipped(
+    session: Session, annotations: dict[int, tuple[Annotation, ...]]
+) -> tuple[tuple[str, int], ...]:
+    """Reasons why instances of the annotated scenes have no annotation, and of how many."""
+    rows = session.scalars(
+        select(Registration)
+        .join(Registration.task)
+        .where(Task.scene_id.in_(annotations), Registration.state == SKIPPED)
+        .options(contains_eager(Registration.task).joinedload(Task.object))
+    ).all()
+    annotated = {(scene, a.obj_id, a.instance) for scene, found in annotations.items() for a in found}
+    skipped = {(instance_key(row), str(row.skip_reason)) for row in rows}
+    counts = Counter(reason for key, reason in skipped if key not in annotated)
+    return tuple(sorted(counts.items()))
 
 
 def select_annotations(session: Session, dataset_id: int) -> dict[int, tuple[Annotation, ...]]:

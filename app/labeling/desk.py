@@ -15,10 +15,12 @@ from sqlalchemy.orm import joinedload
 from app import __version__
 from app.auth import Identity, Role
 from app.database import Database
-from app.event_log import EventLog, NewEvent
+from app.event_log import STATE_AFTER, EventLog, NewEvent
 from app.labeling.chair import Chair
 from app.labeling.history import replay
 from app.labeling.machine import SamePose
+from app.labeling.neighbours import Neighbours
+from app.labeling.scene_things import things_of_scene
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.view import DragHandlers, FirstView, SceneView
@@ -53,6 +55,7 @@ class Seat:
     session: LabelingSession
     frames: dict[int, Frame]
     model: ObjectModel
+    neighbours: Neighbours
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
@@ -182,16 +185,20 @@ class Desk:
             frame_id = event.detail["frame_id"] if event.kind == "frame" else frame_id
         model = self._data.model(task.object)
         self._snapper.prepare(model)
+        neighbours = Neighbours(lambda: things_of_scene(self._database, self._data, registration), self._data)
 
         def record_event(event: NewEvent, estimate: EstimateRow | None = None) -> None:
             self._log.append(registration.id, registration.user_id, event, estimate)
+            if event.kind in STATE_AFTER:
+                self._renew_scene(task.scene_id)
 
         def request_snap(
             order: SnapOrder,
             on_progress: Callable[[float], None],
             on_end: Callable[[SnapResult | SnapFailure], None],
         ) -> Callable[[], None]:
-            return self._request_snap(frames[order.frame_id], model, order, on_progress, on_end)
+            frame = frames[order.frame_id]
+            return self._request_snap(frame, model, neighbours, order, on_progress, on_end)
 
         session = LabelingSession(
             registration_id=registration.id,
@@ -204,13 +211,26 @@ class Desk:
             same_pose=_same_pose_of(model),
             record_event=record_event,
             request_snap=request_snap,
+            skip_reason=registration.skip_reason,
+            known_objects=lambda: neighbours.known,
         )
-        return Seat(registration, session, frames, model)
+        return Seat(registration, session, frames, model, neighbours)
+
+    def _renew_scene(self, scene_id: int) -> None:
+        """Tell all who work in a scene that something in it was submitted, skipped or reopened."""
+        with self._lock:
+            seats = [seat for seat in self._seats.values() if seat.registration.task.scene_id == scene_id]
+        for seat in seats:
+            try:
+                seat.neighbours.renew()
+            except Exception:  # what happened is on the disk, whoever cannot be told of it
+                logger.exception("registration %d was not told of its scene", seat.registration.id)
 
     def _request_snap(
         self,
         frame: Frame,
         model: ObjectModel,
+        neighbours: Neighbours,
         order: SnapOrder,
         on_progress: Callable[[float], None],
         on_end: Callable[[SnapResult | SnapFailure], None],
@@ -225,7 +245,10 @@ class Desk:
             on_end(SnapResult(outcome.estimate, T_world_object, __version__, outcome.hardware))
 
         try:
-            job = self._job(frame, model, order, pose.inverse(T_world_camera) @ order.T_world_object)
+            explained = neighbours.explained(frame, order.known)
+            job = self._job(
+                frame, model, order, explained, pose.inverse(T_world_camera) @ order.T_world_object
+            )
         except ValueError as error:
             on_end(SnapFailure(f"The snap cannot work on this: {error}."))
             return lambda: None
@@ -233,20 +256,26 @@ class Desk:
         return self._snapper.request(job, model, on_progress, ended, priority)
 
     def _job(
-        self, frame: Frame, model: ObjectModel, order: SnapOrder, T_camera_object: np.ndarray
+        self,
+        frame: Frame,
+        model: ObjectModel,
+        order: SnapOrder,
+        explained: np.ndarray | None,
+        T_camera_object: np.ndarray,
     ) -> SnapJob:
         camera = camera_of(frame)
         whole = self._data.depth(frame)
         left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
-        depth = whole[top : top + height, left : left + width]
-        if not depth.any():  # nothing near the object is no error, a camera that saw nothing is one
-            left, top, depth = 0, 0, whole
+        if not whole[top : top + height, left : left + width].any():
+            left, top, (height, width) = 0, 0, whole.shape  # nothing near is no error, nothing seen at all is
+        rows, columns = slice(top, top + height), slice(left, left + width)
         return SnapJob(
             snap_id=order.snap_id,
             topic="" if order.is_live else self._snapper.topic,
             model_hash=model.content_hash,
-            depth=np.ascontiguousarray(depth),
-            camera=camera.cropped(left, top, depth.shape[1], depth.shape[0]),
+            depth=np.ascontiguousarray(whole[rows, columns]),
+            camera=camera.cropped(left, top, width, height),
+            explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
             T_camera_object=T_camera_object,
             config=order.config,
             seed=order.seed,
@@ -260,6 +289,7 @@ class Desk:
         shown = _Shown(view, self._data, seat.frames)
         shown.update(state)
         seat.session.subscribe(shown.update)
+        seat.neighbours.subscribe(view.neighbours.show)
         return view
 
     def _first_view(self, seat: Seat, state: SessionState) -> FirstView:
@@ -282,6 +312,7 @@ class _Shown:
         self._frames = frames
         self._frame_id: int | None = None
         self._ghost: Offer | None = None
+        self._locked = False
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -294,8 +325,10 @@ class _Shown:
         if ghost is not self._ghost:
             self._ghost = ghost
             self._view.show_ghost(ghost.T_world_object if ghost else None)
-        if state.state != "open":
-            self._view.lock_object()
+        locked = state.state != "open"
+        if locked is not self._locked:
+            self._locked = locked
+            self._view.lock_object(locked)
 
     def _show_cloud(self, frame: Frame) -> None:
         cloud = self._data.cloud(frame)

@@ -10,6 +10,7 @@ from app.event_log import NewEvent
 from app.labeling.history import Step
 from app.labeling.live_snap import LiveSnap
 from app.labeling.snap_exchange import (
+    KnownObject,
     Offer,
     RequestSnap,
     SnapFailure,
@@ -17,6 +18,7 @@ from app.labeling.snap_exchange import (
     SnapResult,
     SnapStatus,
     estimate_row,
+    stored_known,
     stored_spread,
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
@@ -44,6 +46,7 @@ class Machine:
         condition: What the machine may do in this task.
         same_pose: Tells whether the operator has seen a result before.
         request_snap: Hands an order to the workers.
+        known_objects: Tells what is known of other objects in the scene.
     """
 
     def __init__(
@@ -53,12 +56,14 @@ class Machine:
         condition: Condition,
         same_pose: SamePose,
         request_snap: RequestSnap,
+        known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
         self._registration_id = registration_id
         self._track = track
         self._condition = condition
         self._same_pose = same_pose
         self._request_snap = request_snap
+        self._known_objects = known_objects
         self._cancel: Callable[[], None] | None = None
         self._live = LiveSnap(request_snap)
         self._taken_over: list[Array] = []
@@ -85,6 +90,7 @@ class Machine:
                     "config": order.config.to_dict(),
                     "start_spread": stored_spread(order.start_spread),
                     "frame_id": order.frame_id,
+                    "known_objects": stored_known(order.known),
                 },
             )
         )
@@ -185,6 +191,7 @@ class Machine:
             config=config,
             seed=secrets.randbelow(2**31) if seed is None else seed,
             start_spread=start_spread,
+            known=self._known_objects(),
         )
 
     def _progressed(self, snap_id: str, share: float) -> None:

@@ -14,12 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.auth import Actor
-from app.event_log import NewEvent
+from app.event_log import STATE_AFTER, NewEvent
 from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
 from app.labeling.machine import Machine, SamePose
-from app.labeling.snap_exchange import Offer, RequestSnap, SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.snap_exchange import (
+    KnownObject,
+    Offer,
+    RequestSnap,
+    SnapFailure,
+    SnapOrder,
+    SnapResult,
+    SnapStatus,
+)
 from app.labeling.start_spread import StartSpread, Unsaid
 from app.labeling.track import ActionError, RecordEvent, Track
 from app.tables import Condition
@@ -35,6 +43,7 @@ class SessionState:
 
     registration_id: int
     state: str
+    skip_reason: str | None
     frame_id: int
     T_world_object: Array
     confidence: float | None
@@ -56,7 +65,7 @@ class LabelingSession:
     Args:
         registration_id: Whose row in the database this is.
         history: The poses so far, as replayed from the log.
-        state: "open" or "submitted".
+        state: "open", "submitted" or "skipped".
         frame_id: The frame that is shown and snapped against.
         frame_ids: The scene's frames.
         pivot: The gizmo's place (3,) on the object, metres, in the object's frame.
@@ -64,6 +73,8 @@ class LabelingSession:
         same_pose: Tells whether two poses are one, as far as anybody could tell.
         record_event: Writes an event durably; raises where it cannot.
         request_snap: Hands an order to the workers.
+        skip_reason: Why it was skipped, where it was.
+        known_objects: Tells what is known of other objects in the scene.
     """
 
     def __init__(
@@ -78,14 +89,17 @@ class LabelingSession:
         same_pose: SamePose,
         record_event: RecordEvent,
         request_snap: RequestSnap,
+        skip_reason: str | None = None,
+        known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
     ) -> None:
         self.registration_id = registration_id
         self._state = state
+        self._skip_reason = skip_reason
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
-            registration_id, self._track, condition, same_pose, self._request_from_workers
+            registration_id, self._track, condition, same_pose, self._request_from_workers, known_objects
         )
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
@@ -101,6 +115,7 @@ class LabelingSession:
             return SessionState(
                 registration_id=self.registration_id,
                 state=self._state,
+                skip_reason=self._skip_reason,
                 frame_id=track.frame_id,
                 T_world_object=track.T_world_object,
                 confidence=None if track.drag else history.current.confidence,
@@ -236,11 +251,21 @@ class LabelingSession:
         with self._lock:
             self._require_free_hands()
             self._machine.abandon(actor, "submitted")
-            T = self._track.history.current.T_world_object.tolist()
-            self._track.record(NewEvent(kind="submit", actor=actor, T_before=T, T_after=T))
-            self._state = "submitted"
-            self._machine.offer = None
-            self._changed()
+            self._change_state("submit", actor)
+
+    def skip(self, actor: Actor, reason: str) -> None:
+        """Finish the registration without a pose, saying why."""
+        with self._lock:
+            self._require_free_hands()
+            self._machine.abandon(actor, "skipped")
+            self._change_state("skip", actor, reason)
+
+    def reopen(self, actor: Actor) -> None:
+        """Go on with a registration that was submitted or skipped; undo and redo are as they were."""
+        with self._lock:
+            if self._is_open:
+                raise ActionError("This registration is open.")
+            self._change_state("reopen", actor)
 
     # -- the machine's hand ------------------------------------------------------------------------
 
@@ -311,12 +336,20 @@ class LabelingSession:
 
     def _require_open(self) -> None:
         if not self._is_open:
-            raise ActionError("This registration was submitted and cannot be changed any more.")
+            raise ActionError(f"This registration was {self._state}; reopen it to change it.")
 
     def _require_free_hands(self) -> None:
         self._require_open()
         if self._track.drag is not None:
             raise ActionError("The object is being dragged; let go of it first.")
+
+    def _change_state(self, kind: str, actor: Actor, reason: str | None = None) -> None:
+        T = self._track.history.current.T_world_object.tolist()
+        detail = {} if reason is None else {"reason": reason}
+        self._track.record(NewEvent(kind=kind, actor=actor, T_before=T, T_after=T, detail=detail))
+        self._state, self._skip_reason = STATE_AFTER[kind], reason
+        self._machine.offer = None
+        self._changed()
 
     def _write_drag(self) -> bool:
         """End the drag; tells whether it moved anything."""

@@ -10,9 +10,19 @@ from numpy.typing import NDArray
 from app.auth import Actor
 from app.labeling.start_spread import StartSpread
 from app.tables import EstimateRow
-from registration_core import Estimate, SnapConfig
+from registration_core import Estimate, ObjectModel, SnapConfig
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class KnownObject:
+    """Another thing of the scene, whose pose is done: it is not what a snap looks for, and hides that."""
+
+    registration_id: int
+    object_id: int
+    T_world_object: Array
+    model: ObjectModel
 
 
 @dataclass(frozen=True)
@@ -26,6 +36,7 @@ class SnapOrder:
     seed: int
     start_spread: StartSpread | None
     """How far off the pose may be; None where that is unknown."""
+    known: tuple[KnownObject, ...] = ()
     is_live: bool = False
     """Nobody waits for it: others go first, and its progress is of no interest."""
 
@@ -93,6 +104,18 @@ def stored_spread(spread: StartSpread | None) -> list[float] | None:
     return None if spread is None else list(spread)
 
 
+def stored_known(known: tuple[KnownObject, ...]) -> list[dict[str, object]]:
+    """Known objects as JSON keeps them: their registrations may be reopened later."""
+    return [
+        {
+            "registration_id": one.registration_id,
+            "object_id": one.object_id,
+            "T_world_object": one.T_world_object.tolist(),
+        }
+        for one in known
+    ]
+
+
 def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> EstimateRow:
     """A result as it is kept, with all that is needed to repeat it."""
     estimate = result.estimate
@@ -114,6 +137,7 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         seed=order.seed,
         config=order.config.to_dict(),
         start_spread=stored_spread(order.start_spread),
+        known_objects=stored_known(order.known),
         version=result.version,
         hardware=result.hardware,
         seconds=estimate.seconds,

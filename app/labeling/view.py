@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from viser import _messages
 
 from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.neighbour_view import NeighbourView
 from app.labeling.viewpoint import Viewpoint
 from registration_core import ObjectModel, pose
 
@@ -71,6 +72,7 @@ class SceneView:
         self._model = model
         self._ghost: viser.MeshHandle | None = None
         self._gizmo, self._mesh = self._add_object(T_world_object)
+        self.neighbours = NeighbourView(self._server)
         self._follow_drags(drag)
 
     @property
@@ -138,12 +140,12 @@ class SceneView:
             self._ghost.wxyz = wxyz
             self._ghost.visible = True
 
-    def lock_object(self) -> None:
-        """Take the gizmo's handles away; the object stays in view."""
+    def lock_object(self, locked: bool) -> None:
+        """Take the gizmo's handles away, or give them back; the object stays in view."""
         with self._server.atomic():
-            self._gizmo.disable_axes = True
-            self._gizmo.disable_sliders = True
-            self._gizmo.disable_rotations = True
+            self._gizmo.disable_axes = locked
+            self._gizmo.disable_sliders = locked
+            self._gizmo.disable_rotations = locked
 
     def close(self) -> None:
         """Stop serving."""

@@ -2,6 +2,7 @@
 
 import { nextTask } from "../api.js";
 import { byId, element, icon, picture } from "../dom.js";
+import { taskName } from "../format.js";
 
 /** Shows the next task; without one, says that all is done. Hidden while there are no tasks at all. */
 export async function showNextTask(datasets) {
@@ -21,7 +22,7 @@ function describeTask(task) {
     element(
       "p",
       {},
-      element("span", { className: "next-name" }, task.object.name),
+      element("span", { className: "next-name" }, taskName(task)),
       element("br"),
       element("span", { className: "muted" }, `${task.scene.label} · ${task.dataset.name}`),
     ),

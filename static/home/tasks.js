@@ -2,10 +2,10 @@
 
 import { get, getAll } from "../api.js";
 import { byId, element, icon, picture, setText } from "../dom.js";
-import { count } from "../format.js";
+import { count, taskName } from "../format.js";
 
 const PAGE = 48;
-const STATES = { open: "Open", in_progress: "In progress", submitted: "Submitted" };
+const STATES = { open: "Open", in_progress: "In progress", submitted: "Submitted", skipped: "Skipped" };
 
 /** `openAddTasks` is null for those who may not add tasks; `onProblem(error)` shows what went wrong. */
 export function setUpTasks({ me, openAddTasks, onProblem }) {
@@ -104,13 +104,12 @@ function taskCard(task, me) {
     "data-task-id": task.id,
     "data-state": task.state,
   });
-  const name = task.instance > 0 ? `${task.object.name} (${task.instance + 1})` : task.object.name;
   card.append(
     picture(task.thumbnail_url, "card-picture", { lazy: true }),
     element(
       "span",
       { className: "card-text" },
-      element("span", { className: "card-name" }, name),
+      element("span", { className: "card-name" }, taskName(task)),
       element("span", { className: "card-scene" }, task.scene.label),
       element("span", { className: "card-state" }, icon(task.state), stateSentence(task, me)),
     ),
@@ -118,8 +117,11 @@ function taskCard(task, me) {
   return card;
 }
 
-/** "In progress · you, Ada". */
+/** "In progress · you, Ada", "Skipped · you (no depth)". */
 function stateSentence(task, me) {
-  const names = task.operators.map((operator) => (operator.name === me.name ? "you" : operator.name));
+  const names = task.operators.map(({ name, skip_reason: reason }) => {
+    const who = name === me.name ? "you" : name;
+    return reason ? `${who} (${reason})` : who;
+  });
   return names.length ? `${STATES[task.state]} · ${names.join(", ")}` : STATES[task.state];
 }

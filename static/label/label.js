@@ -9,17 +9,20 @@
 
 import { del, get, post } from "../api.js";
 import { byId, setText } from "../dom.js";
+import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
+import { endingPart } from "./ending.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { machinePart } from "./machine.js";
-import { showNext } from "./next.js";
+import { goToNext } from "./next.js";
 import { numbersPart } from "./numbers.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { followRegistration } from "./stream.js";
+import { thingsPart } from "./things.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
 
@@ -40,11 +43,13 @@ const page = {
   act,
 };
 const PARTS = [
+  endingPart(page),
   imagePart(page),
   machinePart(page),
   numbersPart(page),
   placePart(page),
   precisionPart(page),
+  thingsPart(page),
   viewsPart(page),
 ];
 
@@ -54,7 +59,8 @@ const ACTIONS = {
   undo: () => post(path("undo")),
   redo: () => post(path("redo")),
   reset: () => post(path("reset")),
-  submit: () => post(path("submit")),
+  submit: async () => show(await post(path("submit"))), // at once: the next Enter goes on
+  reopen: () => post(path("reopen")),
   "offer-accept": () => post(path("accept")),
   "offer-dismiss": () => post(path("dismiss")),
 };
@@ -107,11 +113,12 @@ async function openTask() {
 }
 
 function showTask() {
-  const { dataset, scene, object } = task;
-  document.title = `${object.name} · ${scene.label} · Snap6D`;
+  const { dataset, scene } = task;
+  const name = taskName(task);
+  document.title = `${name} · ${scene.label} · Snap6D`;
   setText(byId("crumb-dataset"), dataset.name);
   setText(byId("crumb-scene"), scene.label);
-  setText(byId("crumb-object"), object.name);
+  setText(byId("crumb-object"), name);
   byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
   byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
 }
@@ -136,7 +143,7 @@ function show(received) {
   reportSnap(before?.snap, registration.snap);
   const { message: problem } = registration;
   if (problem && problem !== before?.message) message.show(problem, "problem");
-  if (registration.state === "submitted" && before?.state !== "submitted") showSubmitted();
+  if (before && registration.state !== before.state) showDatasetProgress().catch(message.problem);
 }
 
 function reportSnap(before, snap) {
@@ -144,11 +151,6 @@ function reportSnap(before, snap) {
   if (snap.asked_by === "machine") return;
   if (snap.state !== "failed") message.clear();
   else message.show(snap.message, "problem", { label: "Try again", run: () => act("snap") });
-}
-
-async function showSubmitted() {
-  message.clear();
-  await Promise.all([showNext(), showDatasetProgress()]).catch(message.problem);
 }
 
 async function act(name) {
@@ -187,7 +189,7 @@ function leaveOrCancel() {
 }
 
 function submitOrGoOn() {
-  if (registration?.state === "submitted") location.assign(byId("next-task").href);
+  if (registration && registration.state !== "open") goToNext();
   else if (registration && isSnapping(registration)) {
     message.show("A snap is running: wait for it, or cancel it (Esc), and submit then.");
   } else act("submit");

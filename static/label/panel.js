@@ -34,6 +34,8 @@ export function possible(registration, connected) {
     redo: open && registration.can_redo,
     reset: open && registration.can_undo,
     submit: open && !isSnapping(registration) && !registration.dragging,
+    skip: open && !registration.dragging,
+    reopen: connected && registration !== null && registration.state !== "open",
     "offer-accept": open && shown !== null,
     "offer-dismiss": open && registration.offer !== null,
   };
@@ -46,8 +48,8 @@ export function drawPanel(registration, connected) {
   drawSnap(registration);
   drawOffer(registration);
   setText(byId("hint"), hintFor(registration));
-  byId("submit").hidden = registration.state === "submitted";
-  byId("submitted").hidden = registration.state !== "submitted";
+  byId("finish").hidden = registration.state !== "open";
+  byId("submitted").hidden = registration.state === "open";
 }
 
 function drawSaved({ dragging }, connected) {

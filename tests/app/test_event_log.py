@@ -127,6 +127,24 @@ def test_a_submission_closes_the_registration_with_its_pose(log, registrations, 
     assert (other.state, other.T_world_object, other.submitted_at) == ("open", None, None)
 
 
+def test_a_skip_closes_the_registration_without_a_pose_and_reopening_clears_all(log, registrations, database):
+    def closed() -> tuple[object, ...]:
+        with database.read() as session:
+            row = session.get_one(Registration, registrations[0])
+        return row.state, row.T_world_object, row.submitted_at, row.skip_reason
+
+    T = np.eye(4).tolist()
+    reopened = ("open", None, None, None)
+    log.append(registrations[0], 1, NewEvent("skip", Actor.HUMAN, detail={"reason": "no depth"}))
+    assert closed() == ("skipped", None, None, "no depth")
+    log.append(registrations[0], 1, NewEvent("reopen", Actor.HUMAN, T_before=T, T_after=T))
+    assert closed() == reopened
+    log.append(registrations[0], 1, NewEvent("submit", Actor.HUMAN, T_before=T, T_after=T))
+    assert closed()[:2] == ("submitted", T)
+    log.append(registrations[0], 1, NewEvent("reopen", Actor.HUMAN, T_before=T, T_after=T))
+    assert closed() == reopened
+
+
 def test_an_event_of_nobody_is_refused(log):
     with pytest.raises(Exception, match="FOREIGN KEY"):
         log.append(99, 99, NewEvent("opened", Actor.HUMAN))

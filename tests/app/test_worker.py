@@ -11,7 +11,7 @@ from distributed import Client
 from app import worker
 from app.worker import SnapCancelledError
 from registration_core import ObjectModel, SnapConfig
-from tests.app.snap_jobs import T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
+from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
 from tests.app.waiting import LONGEST, wait_until
 
 
@@ -49,6 +49,13 @@ def test_it_finds_what_the_library_finds(client, addresses, model, config):
     assert_same(result.estimate, done_here(job, model))
     assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
     assert result.hardware
+
+
+def test_it_passes_by_what_it_is_told_of(client, addresses, model):
+    job = new_job(model, explained=np.ones(DEPTH.shape, dtype=np.bool_))
+    result = run(client, addresses[0], worker.run_snap, job, model)
+    assert np.allclose(result.estimate.T_camera_object, job.T_camera_object)
+    assert not result.estimate.converged
 
 
 @pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])

@@ -83,7 +83,8 @@ def test_what_lies_beyond_the_outline_decides_the_class_of_the_ring(beyond, on_p
     alone = render_depth(plate, camera, T)
     depth = np.where(alone > 0, alone, np.float32(beyond))
     weight = np.where((alone == 0) & on_plane, np.float32(0.1), np.float32(1.0))
-    grid = Grid(depth, np.zeros((3, 200, 200), np.float32), weight, *map(f4, (200, 200, 99.5, 99.5)))
+    known = np.zeros((200, 200), np.bool_)
+    grid = Grid(depth, np.zeros((3, 200, 200), np.float32), weight, *map(f4, (200, 200, 99.5, 99.5)), known)
     ring = evidence(to_rows(T), model, grid, 0.6)[0][RING : RING + 8]
     assert ring[kind] > 0.1
     assert ring.sum() == ring[kind]

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from app.export.dataset_info import dataset_info
 from app.export.selection import ExportError, Selection, select_dataset
-from app.tables import Scene
+from app.tables import Registration, Scene
 from registration_core import pose
 
 from .site import BLOCK, POSED, TOOL, UNPOSED, Site, true_pose
@@ -45,6 +46,21 @@ def test_images_imported_as_worlds_of_their_own_meet_in_their_scene(site: Site) 
         tool = image.annotations[0]
         np.testing.assert_array_equal(tool.T_world_object, true_pose(UNPOSED[image.image_id], TOOL))
     assert selection.images_left_out == selection.instances_open == 0
+
+
+def test_what_was_skipped_is_left_out_and_counted_by_its_reason(site: Site) -> None:
+    site.submit(site.tasks[POSED, TOOL], true_pose(POSED, TOOL))
+    for task, user in ((POSED, BLOCK), 1), ((POSED, TOOL), 2):  # somebody else did submit the tool
+        with site.database.write() as session:
+            row = Registration(
+                task_id=site.tasks[task], user_id=user, state="skipped", skip_reason="no depth"
+            )
+            session.add(row)
+    selection = selected(site)
+    assert selection.instances_skipped == (("no depth", 1),)
+    assert selection.instances_open == 1
+    assert len(selection.annotations) == 1
+    assert "skipped by those who looked for them: 1 as 'no depth'." in dataset_info(selection)
 
 
 def test_annotations_are_in_the_order_of_objects(site: Site) -> None:

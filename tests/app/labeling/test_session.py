@@ -353,6 +353,7 @@ def test_a_snap_is_applied_with_its_estimate(bench):
         "seed": 42,
         "config": SnapConfig.paper().to_dict(),
         "start_spread": None,
+        "known_objects": [],
         "frame_id": FRAMES[0],
     }
     assert (applied.kind, applied.actor, applied.snap_id) == ("snap_applied", Actor.MACHINE, snap_id)
@@ -622,6 +623,51 @@ def test_a_submitted_registration_refuses_every_change(bench):
     bench.drag(shifted(0.7))
     assert np.array_equal(bench.state.T_world_object, shifted(0.1))
     assert len(bench.log.events) == 4
+
+
+def test_a_skipped_registration_says_why_and_refuses_changes(bench):
+    bench.drag(shifted(0.1))
+    bench.session.snap(Actor.HUMAN)
+    bench.session.skip(Actor.HUMAN, "no depth")
+    assert bench.workers.snaps[0].cancelled
+    assert bench.log.kinds == ["drag", "snap_requested", "snap_cancelled", "skip"]
+    assert bench.log.events[-1].detail == {"reason": "no depth"}
+    assert (bench.state.state, bench.state.skip_reason) == ("skipped", "no depth")
+    for act in (
+        lambda: bench.session.undo(Actor.HUMAN),
+        lambda: bench.session.submit(Actor.HUMAN),
+        lambda: bench.session.skip(Actor.HUMAN, "ambiguous"),
+    ):
+        with pytest.raises(ActionError, match="was skipped; reopen it"):
+            act()
+
+
+@pytest.mark.parametrize("end", ["submit", "skip"])
+def test_what_was_reopened_goes_on_where_it_was(bench, end):
+    bench.drag(shifted(0.1))
+    bench.drag(shifted(0.2))
+    bench.session.undo(Actor.HUMAN)
+    before = bench.state
+    if end == "submit":
+        bench.session.submit(Actor.HUMAN)
+    else:
+        bench.session.skip(Actor.HUMAN, "ambiguous")
+    bench.session.reopen(Actor.HUMAN)
+    assert bench.log.kinds[-2:] == [end, "reopen"]
+    assert (bench.state.state, bench.state.skip_reason) == ("open", None)
+    assert (bench.state.can_undo, bench.state.can_redo) == (before.can_undo, before.can_redo) == (True, True)
+    bench.session.redo(Actor.HUMAN)
+    assert np.array_equal(bench.state.T_world_object, shifted(0.2))
+    with pytest.raises(ActionError, match="is open"):
+        bench.session.reopen(Actor.HUMAN)
+
+
+def test_nothing_ends_that_is_not_written_down(bench):
+    bench.log.broken = True
+    for act in (bench.session.submit, lambda actor: bench.session.skip(actor, "ambiguous")):
+        with pytest.raises(OSError, match="no space"):
+            act(Actor.HUMAN)
+        assert bench.state.state == "open"
 
 
 def test_a_session_opens_as_submitted():

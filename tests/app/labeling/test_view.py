@@ -228,7 +228,7 @@ def test_a_drag_that_cannot_be_saved_does_not_break_the_view(view, hand, model):
 def test_a_locked_object_has_no_handles_left(view):
     with connect(view) as client:
         client.node("TransformControlsMessage", "/object")
-        view.lock_object()
+        view.lock_object(True)
         for name in ("disable_axes", "disable_sliders", "disable_rotations"):
             update = client.wait_for(
                 "SceneNodeUpdateMessage", lambda m, name=name: m["name"] == "/object" and name in m["updates"]

@@ -1,0 +1,72 @@
+"""What is done of a scene beside the thing that is worked on: shown in the 3-D view, and known to snaps."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.labeling.scene_things import Thing
+from app.labeling.snap_exchange import KnownObject
+from app.scene_data import SceneData, camera_of
+from app.tables import Frame
+from registration_core import explained_pixels, pose
+
+Listener = Callable[[Sequence[Thing]], None]
+
+
+class Neighbours:
+    """What one registration knows of its scene, read anew whenever somebody ends or reopens another.
+
+    Args:
+        read: Reads the things of the scene.
+        data: Where depth comes from.
+    """
+
+    def __init__(self, read: Callable[[], tuple[Thing, ...]], data: SceneData) -> None:
+        self._read = read
+        self._data = data
+        self._listeners: list[Listener] = []
+        self._explained: tuple[int, tuple[KnownObject, ...], NDArray[np.bool_]] | None = None
+        self.shown = True
+        """Whether the 3-D view shows what is done; snaps know it all the same."""
+        self.things = read()
+        self.known = _known(self.things)
+
+    def renew(self) -> None:
+        """Read what changed."""
+        self.things = self._read()
+        self.known = _known(self.things)
+        self._tell()
+
+    def show(self, on: bool) -> None:
+        """Show what is done in the 3-D view, or hide it."""
+        self.shown = on
+        self._tell()
+
+    def subscribe(self, listener: Listener) -> None:
+        """Call `listener` with the things that are to be seen, now and whenever they change."""
+        self._listeners.append(listener)
+        listener(self._visible())
+
+    def explained(self, frame: Frame, known: tuple[KnownObject, ...]) -> NDArray[np.bool_] | None:
+        """The pixels (H, W) of a frame that known objects explain; None where nothing is known."""
+        if not known:
+            return None
+        kept = self._explained
+        if kept is None or kept[0] != frame.id or kept[1] is not known:
+            T_camera_world = pose.inverse(np.array(frame.T_world_camera))
+            placed = [(one.model, T_camera_world @ one.T_world_object) for one in known]
+            mask = explained_pixels(self._data.depth(frame), camera_of(frame), placed)
+            kept = self._explained = (frame.id, known, mask)
+        return kept[2]
+
+    def _visible(self) -> list[Thing]:
+        return [thing for thing in self.things if thing.known] if self.shown else []
+
+    def _tell(self) -> None:
+        for listener in self._listeners:
+            listener(self._visible())
+
+
+def _known(things: tuple[Thing, ...]) -> tuple[KnownObject, ...]:
+    return tuple(thing.known for thing in things if thing.known)

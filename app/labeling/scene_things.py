@@ -1,0 +1,94 @@
+"""The things that a scene's tasks ask for: how far the work on each is, and where it is if that is done."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from sqlalchemy import select
+from sqlalchemy.orm import joinedload, selectinload, undefer
+
+from app.database import Database
+from app.labeling.snap_exchange import KnownObject
+from app.scene_data import SceneData
+from app.tables import Registration, Task
+
+COLORS = ("#2fb98a", "#f2e35e", "#cf7fbb", "#d3d7dc", "#8f7cf0", "#a5843c")
+"""They differ in lightness, for those who cannot tell hues, and none is the human's or the machine's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """One instance of an object in a scene."""
+
+    task_id: int
+    name: str
+    """With its number, where the object is there several times."""
+    is_current: bool
+    """Whether it is what the operator works on."""
+    state: str
+    """open, submitted or skipped."""
+    skip_reason: str | None
+    color: str
+    """Of its mesh in the 3-D view, #rrggbb."""
+    known: KnownObject | None
+    """Where it is, if it is submitted."""
+
+
+def things_of_scene(database: Database, data: SceneData, registration: Registration) -> tuple[Thing, ...]:
+    """What is asked for in a registration's scene, in the order of the tasks.
+
+    Of tasks for one and the same thing, in other modes or conditions, one stands for all. How far it is says
+    the operator's own registration, if it is done, else the newest that anybody submitted.
+    """
+    own = registration.task
+    groups = defaultdict(list)
+    for task in _tasks(database, own.scene_id):
+        groups[task.object_id, task.instance].append(task)
+    return tuple(
+        _thing(tasks, own, registration.user_id, COLORS[index % len(COLORS)], data)
+        for index, tasks in enumerate(groups.values())
+    )
+
+
+def name_of(task: Task) -> str:
+    """ "mug", or "mug #2" where there are several; `Task.instances` has to be loaded."""
+    return f"{task.object.name} #{task.instance + 1}" if task.instances > 1 else task.object.name
+
+
+def _tasks(database: Database, scene_id: int) -> Sequence[Task]:
+    with database.read() as session:
+        return session.scalars(
+            select(Task)
+            .where(Task.scene_id == scene_id)
+            .options(joinedload(Task.object), selectinload(Task.registrations), undefer(Task.instances))
+            .order_by(Task.id)
+        ).all()
+
+
+def _thing(tasks: list[Task], own: Task, user_id: int, color: str, data: SceneData) -> Thing:
+    task = min(tasks, key=lambda t: (t.id != own.id, t.mode != own.mode, t.condition != own.condition, t.id))
+    done = _newest([r for t in tasks for r in t.registrations if r.state != "open"], user_id)
+    is_current = task.id == own.id
+    known = None
+    if done is not None and done.T_world_object is not None and not is_current:
+        T_world_object = np.array(done.T_world_object)
+        known = KnownObject(done.id, task.object_id, T_world_object, data.model(task.object))
+    return Thing(
+        task_id=task.id,
+        name=name_of(task),
+        is_current=is_current,
+        state=done.state if done else "open",
+        skip_reason=done.skip_reason if done else None,
+        color=color,
+        known=known,
+    )
+
+
+def _newest(done: list[Registration], user_id: int) -> Registration | None:
+    """Mine goes before others', a pose before none, and the newest before older ones."""
+    return max(
+        done,
+        key=lambda r: (r.user_id == user_id, r.state == "submitted", r.submitted_at or r.created_at),
+        default=None,
+    )

@@ -1,0 +1,130 @@
+"""What is done of a scene beside the thing that is worked on: told, shown, and known to snaps."""
+
+import numpy as np
+import pytest
+
+from app.auth import Actor, Identity, Role
+from app.labeling.desk import Seat
+from app.services import Services
+from app.tables import Task
+from registration_core import pose
+from tests.app.labeling.test_desk import sign_up, wait_for_snap
+from tests.app.labeling.viser_client import ViserClient
+from tests.app.small_dataset import BLOCK, TOOL, true_pose
+
+
+@pytest.fixture
+def ann(services: Services) -> Identity:
+    return sign_up(services, "ann")
+
+
+@pytest.fixture
+def seat(services: Services, ann: Identity) -> Seat:
+    """Ann before the first task: the angle tool of scene 1, where there is a block, too."""
+    return services.desk.start(1, ann)
+
+
+def submitted(services: Services, task_id: int, user: Identity, T_world_object: np.ndarray) -> Seat:
+    other = services.desk.start(task_id, user)
+    other.session.set_pose(T_world_object, Actor.HUMAN)
+    other.session.submit(Actor.HUMAN)
+    return other
+
+
+def states(seat: Seat) -> list[tuple[str, str, bool]]:
+    return [(thing.name, thing.state, thing.known is not None) for thing in seat.neighbours.things]
+
+
+def test_things_are_those_of_the_scene_and_follow_what_happens(services, seat, ann):
+    assert states(seat) == [("angle tool", "open", False), ("block", "open", False)]
+    assert [thing.is_current for thing in seat.neighbours.things] == [True, False]
+    block = submitted(services, 2, ann, true_pose(BLOCK))
+    assert states(seat)[1] == ("block", "submitted", True)
+    (known,) = seat.neighbours.known
+    assert known.registration_id == block.registration.id
+    assert np.array_equal(known.T_world_object, true_pose(BLOCK))
+    block.session.reopen(Actor.HUMAN)
+    assert states(seat)[1] == ("block", "open", False) and seat.neighbours.known == ()
+    block.session.skip(Actor.HUMAN, "no depth")
+    assert states(seat)[1] == ("block", "skipped", False)
+    assert seat.neighbours.things[1].skip_reason == "no depth"
+    assert seat.neighbours.known == ()
+
+
+def test_other_worlds_are_not_known(services, seat, ann):
+    submitted(services, 4, ann, true_pose(BLOCK, posed=False))
+    assert seat.neighbours.known == ()
+
+
+def test_mine_goes_before_the_newest_of_others(services, seat, ann):
+    bob, cid = sign_up(services, "bob"), sign_up(services, "cid")
+    theirs = [submitted(services, 2, user, true_pose(BLOCK)) for user in (bob, cid)]
+    assert seat.neighbours.known[0].registration_id == theirs[1].registration.id
+    mine = submitted(services, 2, ann, true_pose(BLOCK))
+    theirs[0].session.reopen(Actor.HUMAN)
+    theirs[0].session.submit(Actor.HUMAN)
+    assert seat.neighbours.known[0].registration_id == mine.registration.id
+
+
+def test_own_thing_of_another_operator_or_condition_is_no_neighbour(services, seat, ann):
+    with services.database.write() as session:
+        first = session.get_one(Task, 1)
+        columns = ("scene_id", "object_id", "instance", "mode", "frame_id", "T_world_object_start")
+        values = {name: getattr(first, name) for name in columns}
+        by_hand = Task(**values, condition="manual")
+        twin = Task(**(values | {"instance": 1}), condition="snap")
+        session.add_all([by_hand, twin])
+    submitted(services, 1, sign_up(services, "bob"), true_pose(TOOL))
+    submitted(services, by_hand.id, ann, true_pose(TOOL))
+    assert seat.neighbours.known == ()
+    assert [name for name, _, _ in states(seat)] == ["angle tool #1", "block", "angle tool #2"]
+
+
+def test_a_snap_says_what_it_knew_and_passes_it_by(services, seat, ann):
+    start = true_pose(BLOCK) @ pose.exp([0.005, 0.0, 0.0, 0.0, 0.0, 0.1])
+    block = services.desk.start(2, ann)
+    twin = submitted(services, 1, sign_up(services, "bob", Role.OPERATOR), true_pose(TOOL))
+    block.session.set_pose(start, Actor.HUMAN)
+    block.session.snap(Actor.HUMAN, seed=3)
+    assert wait_for_snap(block) == "done"
+    events = services.log.events(block.registration.id)
+    (requested,) = [event for event in events if event.kind == "snap_requested"]
+    estimate = services.log.estimate(requested.snap_id)
+    expected = [
+        {
+            "registration_id": twin.registration.id,
+            "object_id": twin.registration.task.object_id,
+            "T_world_object": true_pose(TOOL).tolist(),
+        }
+    ]
+    assert requested.detail["known_objects"] == estimate.known_objects == expected
+    assert np.allclose(estimate.T_world_object, true_pose(BLOCK), atol=0.05)
+
+
+def test_the_view_shows_what_is_done_in_its_colour_until_it_is_hidden(services, seat, ann):
+    port = services.desk.view_port(seat)
+    with ViserClient(f"ws://127.0.0.1:{port}") as client:
+        client.node("TransformControlsMessage", "/object")
+        block = submitted(services, 2, ann, true_pose(BLOCK))
+        mesh = client.node("MeshMessage", "/neighbours/2")
+        assert "#{:02x}{:02x}{:02x}".format(*mesh["props"]["color"]) == seat.neighbours.things[1].color
+        label = client.node("LabelMessage", "/neighbour-names/2")
+        assert label["props"]["text"] == "block"
+        for hide in (lambda: seat.neighbours.show(False), lambda: block.session.reopen(Actor.HUMAN)):
+            hide()
+            client.wait_for("RemoveSceneNodeMessage", lambda m: m["name"] == "/neighbours/2")
+            seat.neighbours.show(True)
+
+
+def test_an_object_that_was_reopened_gets_its_handles_back(services, seat):
+    port = services.desk.view_port(seat)
+    with ViserClient(f"ws://127.0.0.1:{port}") as client:
+        client.node("TransformControlsMessage", "/object")
+        for act, locked in ((seat.session.submit, True), (seat.session.reopen, False)):
+            act(Actor.HUMAN)
+            client.wait_for(
+                "SceneNodeUpdateMessage",
+                lambda m, locked=locked: (
+                    m["name"] == "/object" and m["updates"].get("disable_axes") is locked
+                ),
+            )
