@@ -17,9 +17,11 @@ from app.api import (
     problems,
     registrations,
     scenes,
+    searches,
     sign_in,
     snaps,
     tasks,
+    uncertainty,
 )
 from app.auth import Auth
 from app.config import Settings
@@ -96,6 +98,8 @@ def create_app(services: Services) -> FastAPI:
         registrations,
         placement,
         snaps,
+        searches,
+        uncertainty,
         exports,
     ):
         app.include_router(module.router)

@@ -3,13 +3,15 @@
  *
  * What else there is on the page are parts: makers that take the `page` below and return any of
  * `bindings` (keys), `open(task, scene, object)`, called once, `draw(registration, before)`, called for
- * every new state, `attach(window)`, called for each document of the 3-D view, and `leave()`, which leaves
- * a mode and tells whether there was one to leave.
+ * every new state, `attach(window)`, called for each document of the 3-D view, `leave()`, which leaves
+ * a mode and tells whether there was one to leave, and `accept()`, which takes what it shows, likewise.
  */
 
 import { del, get, post } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { messageArea } from "../message.js";
+import { candidatesPart } from "./candidates.js";
+import { findPart } from "./find.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
@@ -20,6 +22,7 @@ import { drawPanel, isSnapping, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { followRegistration } from "./stream.js";
+import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
 
@@ -45,6 +48,9 @@ const PARTS = [
   numbersPart(page),
   placePart(page),
   precisionPart(page),
+  findPart(page),
+  candidatesPart(page),
+  uncertaintyPart(page),
   viewsPart(page),
 ];
 
@@ -62,7 +68,7 @@ const ACTIONS = {
 const BINDINGS = [
   { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
   { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
-  { keys: ["Y"], does: "Accept the machine's offer or ghost", run: () => act("offer-accept"), machine: true },
+  { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, machine: true },
   { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
   { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
@@ -184,6 +190,10 @@ function attachToView(viewWindow) {
 
 function leaveOrCancel() {
   if (!PARTS.some((part) => part.leave?.())) act("cancel");
+}
+
+function accept() {
+  if (!PARTS.some((part) => part.accept?.())) act("offer-accept");
 }
 
 function submitOrGoOn() {
