@@ -18,9 +18,11 @@ from app.api import (
     registrations,
     scene_things,
     scenes,
+    searches,
     sign_in,
     snaps,
     tasks,
+    uncertainty,
 )
 from app.auth import Auth
 from app.config import Settings
@@ -98,6 +100,8 @@ def create_app(services: Services) -> FastAPI:
         scene_things,
         placement,
         snaps,
+        searches,
+        uncertainty,
         exports,
     ):
         app.include_router(module.router)

@@ -1,4 +1,4 @@
-"""Hands snaps to worker processes on Dask, tells how far they are, and cancels them."""
+"""Hands snaps and searches to worker processes on Dask, tells how far they are, and cancels them."""
 
 import logging
 import threading
@@ -7,7 +7,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as PlannedCall
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, fire_and_forget
@@ -20,8 +20,10 @@ from registration_core import ObjectModel
 logger = logging.getLogger(__name__)
 
 
-DIED = "The worker died while it computed this snap. Nothing is lost; press Snap to try again."
-UNREACHABLE = "The workers cannot be reached. Nothing is lost; press Snap to try again."
+DIED = "The worker died while it computed this. Nothing is lost; try again."
+UNREACHABLE = "The workers cannot be reached. Nothing is lost; try again."
+
+Result = TypeVar("Result")
 
 
 class SnapError(Exception):
@@ -30,12 +32,12 @@ class SnapError(Exception):
 
 @dataclass
 class _Pending:
-    """A snap that may still bring a result."""
+    """A job that may still bring a result."""
 
-    job: worker.SnapJob
+    job: worker.Job[Any]
     model: ObjectModel
     on_progress: Callable[[float], None]
-    on_end: Callable[[worker.JobResult | SnapError], None]
+    on_end: Callable[[Any], None]
     priority: int
     future: Future | None = None
     begun: bool = False
@@ -76,15 +78,15 @@ class Snapper:
 
     def request(
         self,
-        job: worker.SnapJob,
+        job: worker.Job[Result],
         model: ObjectModel,
         on_progress: Callable[[float], None],
-        on_end: Callable[[worker.JobResult | SnapError], None],
+        on_end: Callable[[Result | SnapError], None],
         priority: int = 0,
     ) -> Callable[[], None]:
-        """Start a snap and return the function that cancels it.
+        """Start a job and return the function that cancels it.
 
-        `on_end` is called once, from another thread, unless the snap is cancelled before. Of snaps that wait
+        `on_end` is called once, from another thread, unless the job is cancelled before. Of jobs that wait
         for a worker, those of higher `priority` go first.
         """
         with self._lock:
@@ -139,7 +141,7 @@ class Snapper:
             return
         model = pending.model if with_model else None
         future = self._client.result().submit(
-            worker.run_snap, pending.job, model, self._cache_dir, pure=False, priority=pending.priority
+            worker.run_job, pending.job, model, self._cache_dir, pure=False, priority=pending.priority
         )
         pending.future = future
         if self._find(snap_id) is None:  # cancelled in this moment
@@ -189,7 +191,7 @@ class Snapper:
         with self._lock:
             return self._pending.get(snap_id)
 
-    def _end(self, snap_id: str, outcome: worker.JobResult | SnapError) -> None:
+    def _end(self, snap_id: str, outcome: object) -> None:
         with self._lock:
             pending = self._pending.pop(snap_id, None)
         if pending is not None:

@@ -7,16 +7,26 @@ on the application's own machine is told of a folder, too, for what it builds of
 import platform
 import signal
 import time
+from abc import ABC, abstractmethod
 from collections import OrderedDict, deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from distributed import get_worker
 from numpy.typing import NDArray
 
-from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap_steps
+from registration_core import (
+    Estimate,
+    Hypothesis,
+    Intrinsics,
+    ObjectModel,
+    SnapConfig,
+    propose,
+    snap_steps,
+)
 from registration_core.compilation import warm_up
 from registration_core.viewpoint_model import viewpoint_model
 
@@ -26,30 +36,34 @@ SECONDS_BETWEEN_REPORTS = 0.05
 _models: OrderedDict[str, ObjectModel] = OrderedDict()
 _cancelled: deque[str] = deque(maxlen=1000)
 
+Result = TypeVar("Result")
+Tell = Callable[[float], None]
+"""Told the share that is done; raises where the job was cancelled."""
+
 
 class SnapCancelledError(Exception):
     """The job was cancelled while it ran."""
 
 
 @dataclass(frozen=True)
-class SnapJob:
-    """All that a worker needs for one snap, but for the object."""
+class Job(ABC, Generic[Result]):
+    """All that a worker needs for one task, but for the object."""
 
     snap_id: str
+    """Names the job."""
     topic: str
     """Where progress is told; empty where nobody asks."""
     model_hash: str
     depth: NDArray[np.float32]
-    """(H, W), metres: the part of the image that the snap may look at."""
+    """(H, W), metres: the part of the image that may be looked at."""
     camera: Intrinsics
     """Of that part."""
-    T_camera_object: NDArray[np.float64]
     config: SnapConfig
     seed: int
-    start_spread: tuple[float, float] | None
-    """How far off T_camera_object may be, metres and radians; None where that is unknown."""
-    explained: NDArray[np.bool_] | None = None
-    """(H, W), the pixels of other objects whose pose is known; None where there are none."""
+
+    @abstractmethod
+    def run(self, model: ObjectModel, tell: Tell) -> Result:
+        """Do it; raises ValueError where the job is bad."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +74,63 @@ class JobResult:
     hardware: str
 
 
-def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = None) -> JobResult | None:
-    """Run one snap, telling how far it is and stopping when it is cancelled.
+@dataclass(frozen=True)
+class SnapJob(Job[JobResult]):
+    """A snap."""
+
+    T_camera_object: NDArray[np.float64]
+    start_spread: tuple[float, float] | None
+    """How far off T_camera_object may be, metres and radians; None where that is unknown."""
+    explained: NDArray[np.bool_] | None = None
+    """(H, W), the pixels of other objects whose pose is known; None where there are none."""
+
+    def run(self, model: ObjectModel, tell: Tell) -> JobResult:
+        """See `registration_core.snap`."""
+        estimate = None
+        rng = np.random.default_rng(self.seed)
+        for step in snap_steps(
+            model,
+            self.depth,
+            self.camera,
+            self.T_camera_object,
+            self.config,
+            rng,
+            self.start_spread,
+            self.explained,
+        ):
+            tell(step.iteration / max(1, step.iterations))
+            estimate = step.estimate
+        assert estimate is not None
+        return JobResult(estimate, _hardware())
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Likely poses, best first, and what they were made with."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    seconds: float
+    hardware: str
+
+
+@dataclass(frozen=True)
+class SearchJob(Job[Proposals]):
+    """A search for the object, without a start."""
+
+    region: tuple[int, int, int, int] | None
+    """(left, top, width, height) in pixels, where to look; everywhere where it is None."""
+
+    def run(self, model: ObjectModel, tell: Tell) -> Proposals:
+        """See `registration_core.propose`, which cannot be stopped half-way but is soon done."""
+        tell(0.0)
+        started = time.perf_counter()
+        rng = np.random.default_rng(self.seed)
+        found = propose(model, self.depth, self.camera, self.region, self.config, rng)
+        return Proposals(found, time.perf_counter() - started, _hardware())
+
+
+def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None = None) -> Result | None:
+    """Run one job, telling how far it is and stopping when it is cancelled.
 
     Args:
         model: The object, where it has to be sent.
@@ -72,28 +141,13 @@ def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = N
 
     Raises:
         SnapCancelledError: where `cancel` was called meanwhile.
-        ValueError: where the job is bad, as `registration_core.snap` says.
+        ValueError: where the job is bad.
     """
     known = model or _models.get(job.model_hash)
     if known is None:
         return None
     prepare(known, cache_dir)
-    reported = 0.0
-    estimate = None
-    rng = np.random.default_rng(job.seed)
-    steps = snap_steps(
-        known, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread, job.explained
-    )
-    for step in steps:
-        if job.snap_id in _cancelled:
-            raise SnapCancelledError(job.snap_id)
-        if job.topic and time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
-            reported = time.monotonic()
-            share = step.iteration / max(1, step.iterations)
-            get_worker().log_event(job.topic, {"snap_id": job.snap_id, "progress": share})
-        estimate = step.estimate
-    assert estimate is not None
-    return JobResult(estimate, _hardware())
+    return job.run(known, _teller(job.snap_id, job.topic))
 
 
 def prepare(model: ObjectModel, cache_dir: Path | None) -> None:
@@ -103,7 +157,7 @@ def prepare(model: ObjectModel, cache_dir: Path | None) -> None:
 
 
 def cancel(snap_id: str) -> None:
-    """Stop a snap at its next step, if it runs here or comes here later."""
+    """Stop a job at its next step, if it runs here or comes here later."""
     _cancelled.append(snap_id)
 
 
@@ -112,6 +166,20 @@ def dask_setup(dask_worker: Any) -> None:
     if dask_worker.nanny:  # which ends this process in order when someone presses Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm_up()
+
+
+def _teller(snap_id: str, topic: str) -> Tell:
+    reported = 0.0
+
+    def tell(share: float) -> None:
+        nonlocal reported
+        if snap_id in _cancelled:
+            raise SnapCancelledError(snap_id)
+        if topic and time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
+            reported = time.monotonic()
+            get_worker().log_event(topic, {"snap_id": snap_id, "progress": share})
+
+    return tell
 
 
 def _keep(model: ObjectModel) -> None:

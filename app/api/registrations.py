@@ -60,6 +60,14 @@ class LiveOut(BaseModel):
     confidence: float
 
 
+class SearchOut(BaseModel):
+    """The last search of a registration, until its candidates are taken or put away."""
+
+    id: str
+    state: str
+    message: str | None
+
+
 class RegistrationOut(BaseModel):
     """One operator's work on one task, now."""
 
@@ -83,6 +91,9 @@ class RegistrationOut(BaseModel):
     offer: OfferOut | None
     is_live: bool
     live: LiveOut | None
+    estimate_snap_id: str | None = Field(description="The snap that the pose stems from.")
+    search: SearchOut | None
+    preview: Pose | None = Field(description="T_world_object that is looked at before it is taken.")
     message: str | None
     view_url: str
 
@@ -92,6 +103,9 @@ class NewPose(BaseModel):
 
     T_world_object: Pose = Field(examples=[EXAMPLE_POSE])
     technique: Technique | None = Field(None, description="How the pose was found, for the log.")
+    stems_from: str | None = Field(
+        None, max_length=40, description="The search or snap that found it, for the log."
+    )
 
 
 class FrameChoice(BaseModel):
@@ -152,7 +166,7 @@ def get_registration(seat: SeatDep) -> RegistrationOut:
 def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Put the object at a pose."""
     T_world_object = rigid_pose(body.T_world_object, "T_world_object")
-    seat.session.set_pose(T_world_object, identity.actor, body.technique)
+    seat.session.set_pose(T_world_object, identity.actor, body.technique, body.stems_from)
     return registration_out(seat)
 
 
@@ -274,6 +288,9 @@ def registration_out(seat: Seat) -> RegistrationOut:
         offer=_offer_out(state),
         is_live=state.is_live,
         live=_live_out(state),
+        estimate_snap_id=state.estimate_snap_id,
+        search=_search_out(state),
+        preview=None if state.preview is None else state.preview.tolist(),
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
     )
@@ -309,6 +326,11 @@ def _live_out(state: SessionState) -> LiveOut | None:
         T_world_object=live.T_world_object.tolist(),
         confidence=live.confidence,
     )
+
+
+def _search_out(state: SessionState) -> SearchOut | None:
+    search = state.search
+    return SearchOut(id=search.id, state=search.state, message=search.message) if search else None
 
 
 def _event_out(row: Event) -> EventOut:

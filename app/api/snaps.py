@@ -79,6 +79,7 @@ class KnownObjectOut(BaseModel):
 class EstimateOut(BaseModel):
     """What a snap found."""
 
+    frame_id: int
     T_world_object: Pose
     T_camera_object: Pose
     confidence: float
@@ -159,7 +160,7 @@ def cancel_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> S
 
 def _events(services: Services, identity: Identity, snap_id: str) -> list[Event]:
     events = list(services.log.snap_events(snap_id))
-    if not events:
+    if not events or events[0].kind == "search_requested":
         raise HTTPException(404, f"There is no snap {snap_id}.")
     services.desk.check_readable(events[0].registration_id, identity)
     return events

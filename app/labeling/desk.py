@@ -21,14 +21,16 @@ from app.labeling.history import replay
 from app.labeling.machine import SamePose
 from app.labeling.neighbours import Neighbours
 from app.labeling.scene_things import things_of_scene
+from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
-from app.labeling.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from app.memory import give_back
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
 from app.tables import Condition, EstimateRow, Frame, Registration, Scene, Task
-from app.worker import JobResult, SnapJob
+from app.worker import JobResult, Proposals, SearchJob, SnapJob
 from registration_core import ObjectModel, pose
 from registration_core.pose_error import mssd
 from registration_core.problem import region_of_interest
@@ -123,6 +125,20 @@ class Desk:
             seat = self._seats.get(registration_id)
         return seat.session.snapshot().snap if seat else None
 
+    def uncertainty(self, seat: Seat, snap_id: str | None) -> Uncertainty | None:
+        """What is not known about a pose that stems from a snap; None where it stems from none."""
+        estimate = None if snap_id is None else self._log.estimate(snap_id)
+        if estimate is None:
+            return None
+        T_world_camera = np.array(seat.frames[estimate.frame_id].T_world_camera)
+        return uncertainty_of(estimate, T_world_camera, seat.model.centre)
+
+    def live_search(self, registration_id: int) -> SnapStatus | None:
+        """The last search of a registration whose session is live."""
+        with self._lock:
+            seat = self._seats.get(registration_id)
+        return seat.session.snapshot().search if seat else None
+
     def view_port(self, seat: Seat) -> int:
         """The loopback port of a session's view, which is made where there is none."""
         with seat.lock:
@@ -200,6 +216,13 @@ class Desk:
             frame = frames[order.frame_id]
             return self._request_snap(frame, model, neighbours, order, on_progress, on_end)
 
+        def request_search(
+            order: SearchOrder,
+            on_progress: Callable[[float], None],
+            on_end: Callable[[SearchResult | SnapFailure], None],
+        ) -> Callable[[], None]:
+            return self._request_search(frames[order.frame_id], model, order, on_progress, on_end)
+
         session = LabelingSession(
             registration_id=registration.id,
             history=replay(np.array(task.T_world_object_start), events),
@@ -213,6 +236,7 @@ class Desk:
             request_snap=request_snap,
             skip_reason=registration.skip_reason,
             known_objects=lambda: neighbours.known,
+            request_search=request_search,
         )
         return Seat(registration, session, frames, model, neighbours)
 
@@ -255,6 +279,32 @@ class Desk:
         priority = LIVE_PRIORITY if order.is_live else 0
         return self._snapper.request(job, model, on_progress, ended, priority)
 
+    def _request_search(
+        self,
+        frame: Frame,
+        model: ObjectModel,
+        order: SearchOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SearchResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        def ended(outcome: Proposals | SnapError) -> None:
+            if isinstance(outcome, SnapError):
+                on_end(SnapFailure(str(outcome)))
+            else:
+                on_end(SearchResult(outcome.hypotheses, outcome.seconds, __version__, outcome.hardware))
+
+        job = SearchJob(
+            snap_id=order.search_id,
+            topic=self._snapper.topic,
+            model_hash=model.content_hash,
+            depth=self._data.depth(frame),
+            camera=camera_of(frame),
+            config=order.config,
+            seed=order.seed,
+            region=order.region,
+        )
+        return self._snapper.request(job, model, on_progress, ended)
+
     def _job(
         self,
         frame: Frame,
@@ -286,7 +336,7 @@ class Desk:
         state = seat.session.snapshot()
         drag = DragHandlers(seat.session.start_drag, seat.session.drag_to, seat.session.end_drag)
         view = SceneView(seat.model, state.T_world_object, self._first_view(seat, state), drag)
-        shown = _Shown(view, self._data, seat.frames)
+        shown = _Shown(view, self._data, seat.frames, lambda snap_id: self.uncertainty(seat, snap_id))
         shown.update(state)
         seat.session.subscribe(shown.update)
         seat.neighbours.subscribe(view.neighbours.show)
@@ -306,13 +356,21 @@ class Desk:
 class _Shown:
     """Keeps a view in step with its session."""
 
-    def __init__(self, view: SceneView, data: SceneData, frames: dict[int, Frame]) -> None:
+    def __init__(
+        self,
+        view: SceneView,
+        data: SceneData,
+        frames: dict[int, Frame],
+        uncertainty: Callable[[str | None], Uncertainty | None],
+    ) -> None:
         self._view = view
         self._data = data
         self._frames = frames
+        self._uncertainty = uncertainty
         self._frame_id: int | None = None
-        self._ghost: Offer | None = None
         self._locked = False
+        self._ghost: np.ndarray | None = None
+        self._snap_id: str | None = None
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -321,10 +379,14 @@ class _Shown:
             self._show_cloud(self._frames[state.frame_id])
         if not state.dragging:
             self._view.move_object(state.T_world_object, state.gizmo_axes)
-        ghost = state.live or state.offer
+        offer = state.live or state.offer
+        ghost = state.preview if offer is None or state.preview is not None else offer.T_world_object
         if ghost is not self._ghost:
             self._ghost = ghost
-            self._view.show_ghost(ghost.T_world_object if ghost else None)
+            self._view.show_ghost(ghost)
+        if state.estimate_snap_id != self._snap_id:
+            self._snap_id = state.estimate_snap_id
+            self._view.uncertainty.show(self._uncertainty(self._snap_id))
         locked = state.state != "open"
         if locked is not self._locked:
             self._locked = locked

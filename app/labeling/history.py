@@ -22,6 +22,8 @@ class LoggedEvent(Protocol):
     def T_after(self) -> Pose | None: ...
     @property
     def detail(self) -> dict[str, object]: ...
+    @property
+    def snap_id(self) -> str | None: ...
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Step:
     """Of the estimate that the pose stems from; None where a person set it."""
     dragged: bool = False
     """Whether an operator dragged the object here from the step before."""
+    snap_id: str | None = None
+    """Of the estimate that the pose stems from."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,6 @@ def replay(T_start: NDArray[np.float64], events: Iterable[LoggedEvent]) -> Histo
         elif event.kind in NEW_POSE_KINDS:
             confidence = event.detail.get("confidence")
             T = np.array(event.T_after, dtype=np.float64)
-            step = Step(T, None if confidence is None else float(str(confidence)), event.kind == "drag")
-            history = history.pushed(step)
+            known = None if confidence is None else float(str(confidence))
+            history = history.pushed(Step(T, known, event.kind == "drag", event.snap_id))
     return history

@@ -72,11 +72,16 @@ class Machine:
         """Of the last snap."""
         self.offer: Offer | None = None
 
+    def require(self) -> None:
+        """Raise `ActionError` where there is no machine."""
+        if self._condition == "manual":
+            raise ActionError("This task is done by hand alone: there is no machine to help.")
+
     def snap(
         self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
     ) -> str:
         """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
-        self._require_machine()
+        self.require()
         self.abandon(actor, "superseded")
         order = self._order(config, seed, start_spread)
         self._track.record(
@@ -119,7 +124,7 @@ class Machine:
         """Turn live snapping on or off."""
         if on == self._live.is_on:
             return
-        self._require_machine()
+        self.require()
         self._track.record(NewEvent(kind="live", actor=actor, detail={"on": on}))
         self._live.is_on = on
 
@@ -162,7 +167,7 @@ class Machine:
         """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
         look = self._live.found
         offer = look.offer if look else self._require_offer()
-        step = Step(offer.T_world_object, offer.confidence)
+        step = Step(offer.T_world_object, offer.confidence, snap_id=offer.snap_id)
         event = self._track.move_event("accept", actor, step, offer.snap_id)
         row = estimate_row(self._registration_id, look.order, look.result) if look else None
         self._track.push(event, step, row)
@@ -231,7 +236,8 @@ class Machine:
         )
         row = estimate_row(self._registration_id, order, result)
         if applied:
-            self._track.push(event, Step(result.T_world_object, estimate.confidence), row)
+            step = Step(result.T_world_object, estimate.confidence, snap_id=order.snap_id)
+            self._track.push(event, step, row)
             self._taken_over += [result.T_world_object] if unasked else []
         else:
             self._track.record(event, row)
@@ -259,10 +265,6 @@ class Machine:
 
     def _is_current(self, snap_id: str) -> bool:
         return self.status is not None and self.status.id == snap_id and self.status.is_live
-
-    def _require_machine(self) -> None:
-        if self._condition == "manual":
-            raise ActionError("This task is done by hand alone: there is no machine to help.")
 
     def _require_offer(self) -> Offer:
         if self.offer is None:

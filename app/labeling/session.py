@@ -4,8 +4,10 @@ Every action is written down before it takes effect, so that what is shown was s
 viser, the web or the workers: the session is handed plain functions.
 """
 
+import secrets
 import threading
 import time
+import uuid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ParamSpec
@@ -19,6 +21,7 @@ from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
 from app.labeling.machine import Machine, SamePose
+from app.labeling.search import Region, RequestSearch, Search, SearchOrder
 from app.labeling.snap_exchange import (
     KnownObject,
     Offer,
@@ -56,6 +59,11 @@ class SessionState:
     is_live: bool
     live: Offer | None
     """Where a snap would land now."""
+    estimate_snap_id: str | None
+    """The snap that the pose stems from."""
+    search: SnapStatus | None
+    preview: Array | None
+    """A pose T_world_object that the operator looks at before taking it."""
     message: str | None
 
 
@@ -73,6 +81,7 @@ class LabelingSession:
         same_pose: Tells whether two poses are one, as far as anybody could tell.
         record_event: Writes an event durably; raises where it cannot.
         request_snap: Hands an order to the workers.
+        request_search: Hands a search to the workers.
         skip_reason: Why it was skipped, where it was.
         known_objects: Tells what is known of other objects in the scene.
     """
@@ -89,6 +98,7 @@ class LabelingSession:
         same_pose: SamePose,
         record_event: RecordEvent,
         request_snap: RequestSnap,
+        request_search: RequestSearch,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
     ) -> None:
@@ -101,6 +111,14 @@ class LabelingSession:
         self._machine = Machine(
             registration_id, self._track, condition, same_pose, self._request_from_workers, known_objects
         )
+        self._search = Search(
+            self._track,
+            lambda order, on_progress, on_end: request_search(
+                order, self._in_turn(on_progress), self._in_turn(on_end)
+            ),
+        )
+        self._preview: tuple[Step, Array] | None = None
+        """What is looked at, and the step that it is looked at from."""
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
         self._gizmo_axes: GizmoAxes = "object"
@@ -127,6 +145,9 @@ class LabelingSession:
                 offer=self._machine.offer,
                 is_live=self._machine.is_live,
                 live=self._machine.live,
+                estimate_snap_id=None if track.drag else history.current.snap_id,
+                search=self._search.status,
+                preview=self._shown_preview(),
                 message=track.message,
             )
 
@@ -176,24 +197,32 @@ class LabelingSession:
             finally:
                 self._changed()
 
-    def set_pose(self, T_world_object: Array, actor: Actor, technique: str | None = None) -> None:
+    def set_pose(
+        self,
+        T_world_object: Array,
+        actor: Actor,
+        technique: str | None = None,
+        stems_from: str | None = None,
+    ) -> None:
         """Put the object at a pose.
 
         Args:
             T_world_object: Where it goes.
             actor: Who moves it.
             technique: How the pose was found, for the log.
+            stems_from: The search or snap that found it, for the log.
         """
         with self._lock:
             self._require_free_hands()
             before = self._track.history.current.T_world_object
+            told = {"technique": technique, "stems_from": stems_from}
             event = NewEvent(
                 kind="set_pose",
                 actor=actor,
                 T_before=before.tolist(),
                 T_after=T_world_object.tolist(),
                 dof=degrees_of_freedom(before, T_world_object, self._track.pivot),
-                detail={} if technique is None else {"technique": technique},
+                detail={name: value for name, value in told.items() if value is not None},
             )
             self._move(event, Step(T_world_object))
             self._changed()
@@ -251,6 +280,7 @@ class LabelingSession:
         with self._lock:
             self._require_free_hands()
             self._machine.abandon(actor, "submitted")
+            self._search.abandon(actor, "submitted")
             self._change_state("submit", actor)
 
     def skip(self, actor: Actor, reason: str) -> None:
@@ -258,6 +288,7 @@ class LabelingSession:
         with self._lock:
             self._require_free_hands()
             self._machine.abandon(actor, "skipped")
+            self._search.abandon(actor, "skipped")
             self._change_state("skip", actor, reason)
 
     def reopen(self, actor: Actor) -> None:
@@ -315,6 +346,55 @@ class LabelingSession:
             self._machine.set_live(on, actor)
             self._changed()
 
+    def search(
+        self,
+        actor: Actor,
+        region: Region | None = None,
+        config: SnapConfig | None = None,
+        seed: int | None = None,
+    ) -> str:
+        """Ask the workers where in the frame the object may be; the newest search wins.
+
+        Args:
+            actor: Who asks.
+            region: Where to look; everywhere where it is None.
+            config: `SnapConfig()` where it is None.
+            seed: A fresh one where it is None.
+
+        Returns:
+            The search's id.
+        """
+        with self._lock:
+            self._require_open()
+            self._machine.require()
+            order = SearchOrder(
+                search_id=uuid.uuid4().hex,
+                frame_id=self._track.frame_id,
+                region=region,
+                config=config or SnapConfig(),
+                seed=secrets.randbelow(2**31) if seed is None else seed,
+            )
+            self._preview = None
+            self._search.start(actor, order)
+            self._changed()
+            return order.search_id
+
+    def leave_search(self, actor: Actor) -> None:
+        """Cancel the search that is under way, or put its candidates away."""
+        with self._lock:
+            self._search.abandon(actor, "cancelled by request")
+            self._search.put_away()
+            self._preview = None
+            self._changed()
+
+    def preview(self, T_world_object: Array | None) -> None:
+        """Show a pose as a ghost, until the object moves or another one is shown; None shows nothing."""
+        with self._lock:
+            self._require_free_hands()
+            now = self._track.history.current
+            self._preview = None if T_world_object is None else (now, T_world_object)
+            self._changed()
+
     def dismiss(self, actor: Actor) -> None:
         """Decline the pose that the machine offers."""
         with self._lock:
@@ -326,6 +406,7 @@ class LabelingSession:
         """End the session, cancelling a snap under way. What was recorded stays, and can be gone on with."""
         with self._lock:
             self._machine.close()
+            self._search.abandon(Actor.MACHINE, "session closed")
             self._listeners.clear()
 
     # -- helpers -----------------------------------------------------------------------------------
@@ -349,6 +430,7 @@ class LabelingSession:
         self._track.record(NewEvent(kind=kind, actor=actor, T_before=T, T_after=T, detail=detail))
         self._state, self._skip_reason = STATE_AFTER[kind], reason
         self._machine.offer = None
+        self._search.put_away()
         self._changed()
 
     def _write_drag(self) -> bool:
@@ -367,6 +449,13 @@ class LabelingSession:
     def _move(self, event: NewEvent, step: Step) -> None:
         self._track.push(event, step)
         self._machine.offer = None
+        self._search.put_away()
+
+    def _shown_preview(self) -> Array | None:
+        if self._preview is None or self._track.drag is not None or not self._is_open:
+            return None
+        looked_at_from, T_world_object = self._preview
+        return T_world_object if looked_at_from is self._track.history.current else None
 
     def _request_from_workers(
         self,

@@ -12,6 +12,7 @@ from viser import _messages
 
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.neighbour_view import NeighbourView
+from app.labeling.uncertainty_view import UncertaintyView
 from app.labeling.viewpoint import Viewpoint
 from registration_core import ObjectModel, pose
 
@@ -71,6 +72,7 @@ class SceneView:
         self._place_camera(first_view)
         self._model = model
         self._ghost: viser.MeshHandle | None = None
+        self.uncertainty = UncertaintyView(self._server, MACHINE_COLOR, model.diameter)
         self._gizmo, self._mesh = self._add_object(T_world_object)
         self.neighbours = NeighbourView(self._server)
         self._follow_drags(drag)

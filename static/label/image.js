@@ -3,7 +3,8 @@
 import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { frameStrip } from "./frames.js";
-import { extentInPicture, loadMesh, meshDrawing, shownCamera } from "./outline.js";
+import { extentInPicture, sharedDrawing, shownCamera } from "./outline.js";
+import { relativeTo } from "./pose.js";
 import { zoomable } from "./zoom.js";
 
 const CLOSE = 2.5; // page pixels to one of the picture from which on these are shown as squares
@@ -39,8 +40,7 @@ export function imagePart(page) {
   }
 
   async function showMesh(object) {
-    mesh = await loadMesh(object.outline_mesh_url);
-    drawMesh = meshDrawing(mesh);
+    ({ mesh, drawMesh } = await sharedDrawing(object.outline_mesh_url));
     byId("no-outline").hidden = drawMesh !== null;
     drawPose();
   }
@@ -53,9 +53,9 @@ export function imagePart(page) {
   function draw(newest) {
     const frame = frames.find(({ id }) => id === newest.frame_id);
     if (!frame) return;
-    registration = newest;
+    registration = newest.preview ? asLookedAt(newest, frame) : newest;
     if (shown !== frame) showFrame(frame);
-    canvas.dataset.source = newest.confidence === null ? "human" : "machine";
+    canvas.dataset.source = newest.preview || newest.confidence !== null ? "machine" : "human";
     drawPose();
   }
 
@@ -130,8 +130,14 @@ function resize(canvas, width, height) {
   if (canvas.height !== height) canvas.height = height;
 }
 
+/** The registration as if the object were where the operator looks before taking it. */
+function asLookedAt(registration, { T_world_camera }) {
+  const { preview } = registration;
+  return { ...registration, T_world_object: preview, T_camera_object: relativeTo(T_world_camera, preview) };
+}
+
 /** The colour of an element as [red, green, blue] from 0 to 1. */
-function colorOf(node) {
+export function colorOf(node) {
   const [red, green, blue] = getComputedStyle(node).color.match(/[\d.]+/g);
   return [red / 255, green / 255, blue / 255];
 }

@@ -3,8 +3,8 @@
  *
  * What else there is on the page are parts: makers that take the `page` below and return any of
  * `bindings` (keys), `open(task, scene, object)`, called once, `draw(registration, before)`, called for
- * every new state, `attach(window)`, called for each document of the 3-D view, and `leave()`, which leaves
- * a mode and tells whether there was one to leave.
+ * every new state, `attach(window)`, called for each document of the 3-D view, `leave()`, which leaves
+ * a mode and tells whether there was one to leave, and `accept()`, which takes what it shows, likewise.
  */
 
 import { del, get, post } from "../api.js";
@@ -12,6 +12,8 @@ import { byId, setText } from "../dom.js";
 import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
 import { endingPart } from "./ending.js";
+import { candidatesPart } from "./candidates.js";
+import { findPart } from "./find.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
@@ -23,6 +25,7 @@ import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
+import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
 
@@ -50,6 +53,9 @@ const PARTS = [
   placePart(page),
   precisionPart(page),
   thingsPart(page),
+  findPart(page),
+  candidatesPart(page),
+  uncertaintyPart(page),
   viewsPart(page),
 ];
 
@@ -68,7 +74,7 @@ const ACTIONS = {
 const BINDINGS = [
   { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
   { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
-  { keys: ["Y"], does: "Accept the machine's offer or ghost", run: () => act("offer-accept"), machine: true },
+  { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, machine: true },
   { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
   { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
   { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
@@ -186,6 +192,10 @@ function attachToView(viewWindow) {
 
 function leaveOrCancel() {
   if (!PARTS.some((part) => part.leave?.())) act("cancel");
+}
+
+function accept() {
+  if (!PARTS.some((part) => part.accept?.())) act("offer-accept");
 }
 
 function submitOrGoOn() {

@@ -73,8 +73,15 @@ void main() {
   painted = painted * (1.0 - line) + vec4(color * line, line);
 }`;
 
+let shared = null;
+
+/** The mesh of the page's object and what draws it, {mesh, drawMesh}: one for all who show it. */
+export function sharedDrawing(url) {
+  return (shared ??= loadMesh(url).then((mesh) => ({ mesh, drawMesh: meshDrawing(mesh) })));
+}
+
 /** The mesh {vertices, faces} behind the `outline_mesh_url` of an object. */
-export async function loadMesh(url) {
+async function loadMesh(url) {
   const answer = await fetch(url);
   if (!answer.ok) throw new Error("The object's mesh could not be loaded; load the page again to see its outline.");
   const content = await answer.arrayBuffer();
@@ -115,7 +122,7 @@ export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
  * outline alone) to 1 (the shape hides what is below), and the pixels of the canvas in one of the page, up to 2. All
  * canvases share one hidden WebGL canvas, since a browser allows only a few.
  */
-export function meshDrawing({ vertices, faces }) {
+function meshDrawing({ vertices, faces }) {
   const hidden = document.createElement("canvas");
   const gl = hidden.getContext("webgl2", { antialias: false, depth: false });
   if (!gl) return null;

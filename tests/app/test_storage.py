@@ -15,7 +15,7 @@ def stored(files: FileStore) -> list[Path]:
     return sorted(path for path in files.root.rglob("*") if path.is_file())
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30, deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 @given(st.binary(max_size=300))
 def test_what_was_put_in_comes_out_under_its_hash(files, content):
     digest = files.put_bytes(content)

@@ -9,8 +9,9 @@ import pytest
 from distributed import Client
 
 from app import worker
-from app.worker import SnapCancelledError
-from registration_core import ObjectModel, SnapConfig
+from app.worker import SearchJob, SnapCancelledError
+from registration_core import ObjectModel, SnapConfig, propose
+from tests.app.export.site import CAMERA
 from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
 from tests.app.waiting import LONGEST, wait_until
 
@@ -45,7 +46,7 @@ def run(client: Client, address: str, function: Any, *arguments: Any) -> Any:
 )
 def test_it_finds_what_the_library_finds(client, addresses, model, config):
     job = new_job(model, config=config)
-    result = run(client, addresses[0], worker.run_snap, job, model)
+    result = run(client, addresses[0], worker.run_job, job, model)
     assert_same(result.estimate, done_here(job, model))
     assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
     assert result.hardware
@@ -64,24 +65,40 @@ def test_it_searches_as_far_as_it_is_told(client, addresses, model, method):
     found = []
     for spread in (None, (0.006, 0.1), (0.06, 1.0)):
         job = new_job(model, config=config, start_spread=spread)
-        result = run(client, addresses[0], worker.run_snap, job, model)
+        result = run(client, addresses[0], worker.run_job, job, model)
         assert_same(result.estimate, done_here(job, model))
         found.append(result.estimate.confidence)
     assert len(set(found)) == 3
 
 
+def test_a_search_finds_what_the_library_finds(client, addresses, model):
+    job = SearchJob("a search", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, (0, 0, 400, 300))
+    found = run(client, addresses[0], worker.run_job, job, model)
+    here = propose(model, DEPTH, CAMERA, job.region, job.config, np.random.default_rng(job.seed))
+    assert found.hypotheses and found.seconds > 0 and found.hardware
+    for one, other in zip(found.hypotheses, here, strict=True):
+        assert np.array_equal(one.T_camera_object, other.T_camera_object) and one.weight == other.weight
+
+
+def test_a_search_cancelled_before_it_comes_does_not_run(client, addresses, model):
+    job = SearchJob("left", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, None)
+    client.run(worker.cancel, job.snap_id)
+    with pytest.raises(SnapCancelledError):
+        run(client, addresses[0], worker.run_job, job, model)
+
+
 def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model):
     here, there = addresses
-    assert run(client, here, worker.run_snap, new_job(model), None) is None
-    assert run(client, here, worker.run_snap, new_job(model), model) is not None
-    assert run(client, here, worker.run_snap, new_job(model), None) is not None
-    assert run(client, there, worker.run_snap, new_job(model), None) is None
+    assert run(client, here, worker.run_job, new_job(model), None) is None
+    assert run(client, here, worker.run_job, new_job(model), model) is not None
+    assert run(client, here, worker.run_job, new_job(model), None) is not None
+    assert run(client, there, worker.run_job, new_job(model), None) is None
 
 
 def test_a_prepared_object_need_not_be_sent(client, addresses, model, tmp_path):
     run(client, addresses[1], worker.prepare, model, tmp_path)
     assert any(tmp_path.rglob("*.npz"))
-    assert run(client, addresses[1], worker.run_snap, new_job(model), None) is not None
+    assert run(client, addresses[1], worker.run_job, new_job(model), None) is not None
     run(client, addresses[0], worker.prepare, new_model(), None)
 
 
@@ -93,7 +110,7 @@ def test_progress_is_told_by_snap(client, addresses, model):
         {"preset": "paper", "particle_filter": {"particles": 60, "iterations": 300}}
     )
     job = new_job(model, topic, config)
-    run(client, addresses[0], worker.run_snap, job, model)
+    run(client, addresses[0], worker.run_job, job, model)
     wait_until(lambda: told, "progress")
     client.unsubscribe_topic(topic)
     assert {report["snap_id"] for report in told} == {job.snap_id}
@@ -105,16 +122,16 @@ def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model)
     job = new_job(model)
     client.run(worker.cancel, job.snap_id)
     with pytest.raises(SnapCancelledError):
-        run(client, addresses[0], worker.run_snap, job, model)
+        run(client, addresses[0], worker.run_job, job, model)
 
 
 def test_a_bad_job_is_refused_by_name(client, addresses, model):
     far = T_CAMERA_TOOL.copy()
     far[:3, 3] = [50.0, 0.0, 1.0]
     with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
-        run(client, addresses[0], worker.run_snap, new_job(model, T_camera_object=far), model)
+        run(client, addresses[0], worker.run_job, new_job(model, T_camera_object=far), model)
     with pytest.raises(ValueError, match="start_spread must be"):
-        run(client, addresses[0], worker.run_snap, new_job(model, start_spread=(-1.0, 0.1)), model)
+        run(client, addresses[0], worker.run_job, new_job(model, start_spread=(-1.0, 0.1)), model)
 
 
 def test_only_the_recent_objects_are_kept(monkeypatch):
@@ -124,7 +141,7 @@ def test_only_the_recent_objects_are_kept(monkeypatch):
     for kept in models:
         worker.prepare(kept, None)
     assert list(worker._models) == [kept.content_hash for kept in models[1:]]
-    assert worker.run_snap(new_job(models[0]), None) is None
+    assert worker.run_job(new_job(models[0]), None) is None
 
 
 def test_the_module_is_a_dask_preload(client):

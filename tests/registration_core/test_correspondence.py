@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from registration_core import pose, snap
@@ -19,7 +19,6 @@ def clicked(points, rng: np.random.Generator, noise: float = 0.005):
     return pose.apply(TRUTH, points) + rng.normal(scale=noise, size=np.shape(points))
 
 
-@settings(deadline=None)  # machines may be busy
 @given(st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6), st.integers(3, 8), st.integers(0, 99))
 def test_recovers_any_pose_from_exact_clicks(twist, count, seed) -> None:
     points = np.random.default_rng(seed).uniform(-0.1, 0.1, size=(count, 3))

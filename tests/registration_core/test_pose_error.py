@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
@@ -89,7 +89,6 @@ def test_symmetric_errors_take_the_nearest_twin():
     assert mssd(estimate, truth, CORNERS) > 0.05
 
 
-@settings(deadline=None)  # machines may be busy
 @given(poses, poses)
 def test_laws_of_the_errors(estimate, truth):
     symmetries = np.stack([np.eye(4), HALF_TURN])
@@ -102,7 +101,6 @@ def test_laws_of_the_errors(estimate, truth):
     )
 
 
-@settings(deadline=None)  # machines may be busy
 @given(poses, poses, poses)
 def test_errors_of_points_do_not_depend_on_the_world(world, estimate, truth):
     for error in (add, adi, mssd):

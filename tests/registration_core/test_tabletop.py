@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 from scipy.spatial.distance import cdist
@@ -70,7 +70,6 @@ squares = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 3)).map(
 )
 
 
-@settings(deadline=None)  # machines may be busy
 @given(squares, squares)
 def test_polygons_are_apart_exactly_where_a_gap_is(a, b):
     def outline(square: np.ndarray) -> np.ndarray:

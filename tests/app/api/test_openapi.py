@@ -75,7 +75,6 @@ def test_calls_get_the_answers_that_are_promised(
     @given(case=schema[path][method].as_strategy())
     @settings(
         max_examples=EXAMPLES,
-        deadline=None,
         derandomize=True,
         database=None,
         phases=[Phase.explicit, Phase.generate],

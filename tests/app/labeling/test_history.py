@@ -29,6 +29,7 @@ class Logged:
     kind: str
     T_after: list[list[float]] | None = None
     detail: dict[str, object] = field(default_factory=dict)
+    snap_id: str | None = None
 
 
 @dataclass
@@ -118,15 +119,15 @@ def test_undoing_everything_leads_back_to_the_start_and_redoing_to_the_end(place
     assert history == end
 
 
-def test_confidence_stays_with_its_pose():
+def test_confidence_and_estimate_stay_with_their_pose():
     log = [
-        Logged("snap_applied", pose_at(1.0).tolist(), {"confidence": 0.75}),
+        Logged("snap_applied", pose_at(1.0).tolist(), {"confidence": 0.75}, "a"),
         Logged("drag", pose_at(2.0).tolist()),
         Logged("undo", pose_at(1.0).tolist()),
     ]
     history = replay(START, log)
-    assert history.current.confidence == 0.75
-    assert history.redone().current.confidence is None
+    assert (history.current.confidence, history.current.snap_id) == (0.75, "a")
+    assert (history.redone().current.confidence, history.redone().current.snap_id) == (None, None)
 
 
 def test_what_was_dragged_is_known_as_such():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from app.labeling import placement
@@ -152,7 +152,6 @@ def first_hit(model: ObjectModel, T: np.ndarray, eye: np.ndarray, point: np.ndar
     return eye + along[inside].min() * ray
 
 
-@settings(deadline=None)  # the first call loads Open3D
 @given(poses, st.tuples(st.floats(0.1, 0.5), numbers, numbers).map(np.array))
 def test_pointed_at_the_object_the_surface_meets_the_point(T, point):
     eye = np.array([-1.0, 0.2, 0.1])

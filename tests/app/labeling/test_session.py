@@ -9,6 +9,7 @@ import pytest
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import History, Step
+from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.labeling.track import ActionError
@@ -78,6 +79,35 @@ class Workers:
         return self.snaps[-1].cancel
 
 
+@dataclass
+class RequestedSearch:
+    """A search that a session asked for, moved on by hand."""
+
+    order: SearchOrder
+    progress: Callable[[float], None]
+    end: Callable[[SearchResult | SnapFailure], None]
+    cancelled: bool = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+@dataclass
+class Searchers:
+    """Takes searches and does nothing by itself."""
+
+    searches: list[RequestedSearch] = field(default_factory=list)
+
+    def __call__(
+        self,
+        order: SearchOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SearchResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        self.searches.append(RequestedSearch(order, on_progress, on_end))
+        return self.searches[-1].cancel
+
+
 def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
     estimate = Estimate(
         T_camera_object=T,
@@ -99,6 +129,7 @@ class Bench:
     def __init__(self, state: str = "open", condition: Condition = "snap") -> None:
         self.log = Log()
         self.workers = Workers()
+        self.searchers = Searchers()
         self.session = LabelingSession(
             registration_id=7,
             history=History((Step(START),)),
@@ -110,6 +141,7 @@ class Bench:
             same_pose=lambda a, b: bool(np.allclose(a, b, atol=0.005)),
             record_event=self.log,
             request_snap=self.workers,
+            request_search=self.searchers,
         )
 
     @property

@@ -1,0 +1,62 @@
+"""What is not known about the present pose, and whether the 3-D view shows it."""
+
+from typing import Literal
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from app.api.dependencies import ServicesDep
+from app.api.registrations import SeatDep
+from app.labeling.track import ActionError
+
+router = APIRouter(prefix="/api/registrations", tags=["uncertainty"])
+
+
+class UnknownMotionOut(BaseModel):
+    """A motion of the object that depth cannot tell from none."""
+
+    kind: Literal["other mode", "free motion"]
+    motion: Literal["turn", "shift"]
+    axis: tuple[float, float, float] = Field(description="Direction in the world.")
+    extent: float = Field(
+        description="Radians or metres: where the mode lies; how far to either side (95 %)."
+    )
+
+
+class UncertaintyOut(BaseModel):
+    """How far off the present pose may be, as the snap that it stems from says."""
+
+    snap_id: str | None = Field(description="Null where it stems from none: then nothing is known.")
+    translation: float | None = Field(description="Metres: 95 % lie within, of the object's middle.")
+    rotation: float | None = Field(description="Radians: 95 % lie within.")
+    unknown: list[UnknownMotionOut]
+
+
+class Shown(BaseModel):
+    """Whether the 3-D view shows it."""
+
+    shown: bool
+
+
+@router.get("/{registration_id}/uncertainty")
+def get_uncertainty(seat: SeatDep, services: ServicesDep) -> UncertaintyOut:
+    """How far off the present pose may be, and what depth does not tell about it."""
+    snap_id = seat.session.snapshot().estimate_snap_id
+    known = services.desk.uncertainty(seat, snap_id)
+    if known is None:
+        return UncertaintyOut(snap_id=None, translation=None, rotation=None, unknown=[])
+    unknown = [
+        UnknownMotionOut(kind=one.kind, motion=one.motion, axis=one.axis.tolist(), extent=one.extent)
+        for one in known.unknown
+    ]
+    return UncertaintyOut(
+        snap_id=snap_id, translation=known.translation, rotation=known.rotation, unknown=unknown
+    )
+
+
+@router.put("/{registration_id}/uncertainty", status_code=204)
+def show_uncertainty(body: Shown, seat: SeatDep) -> None:
+    """Show it in the operator's 3-D view, or hide it there."""
+    if seat.view is None:
+        raise ActionError("Nobody has the 3-D view of this registration open.")
+    seat.view.uncertainty.visible = body.shown

@@ -1,0 +1,138 @@
+"""Finding the object without a start: the search that was asked for, and how it stands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+from app.auth import Actor
+from app.event_log import NewEvent
+from app.labeling.snap_exchange import SnapFailure, SnapStatus
+from app.labeling.track import Track
+from registration_core import Hypothesis, SnapConfig
+
+Region = tuple[int, int, int, int]
+"""(left, top, width, height), pixels."""
+
+
+@dataclass(frozen=True)
+class SearchOrder:
+    """What a search is to look at."""
+
+    search_id: str
+    frame_id: int
+    region: Region | None
+    """Where to look; everywhere where it is None."""
+    config: SnapConfig
+    seed: int
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """Likely poses, best first, and what they were made with."""
+
+    hypotheses: tuple[Hypothesis, ...]
+    seconds: float
+    version: str
+    hardware: str
+
+
+class RequestSearch(Protocol):
+    """Hands an order to the workers and returns a function that cancels it, as `RequestSnap` does."""
+
+    def __call__(
+        self,
+        order: SearchOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SearchResult | SnapFailure], None],
+    ) -> Callable[[], None]: ...
+
+
+class Search:
+    """The newest search of a session, which lets nobody in while somebody else is.
+
+    Args:
+        track: Where it is written down.
+        request_search: Hands an order to the workers.
+    """
+
+    def __init__(self, track: Track, request_search: RequestSearch) -> None:
+        self._track = track
+        self._request_search = request_search
+        self._cancel: Callable[[], None] | None = None
+        self.status: SnapStatus | None = None
+        """Of the last search; None once its candidates were taken or put away."""
+
+    def start(self, actor: Actor, order: SearchOrder) -> None:
+        """Look for the object; the newest search wins."""
+        self.abandon(actor, "superseded")
+        detail = {
+            "seed": order.seed,
+            "config": order.config.to_dict(),
+            "region": None if order.region is None else list(order.region),
+            "frame_id": order.frame_id,
+        }
+        self._track.record(NewEvent("search_requested", actor, snap_id=order.search_id, detail=detail))
+        self.status = SnapStatus(order.search_id, actor)
+        self._cancel = self._request_search(
+            order,
+            lambda share: self._began(order),
+            lambda outcome: self._ended(order, outcome),
+        )
+
+    def abandon(self, actor: Actor, reason: str) -> None:
+        """Stop the search that is under way; nothing happens where there is none."""
+        if self.status is None or not self.status.is_live:
+            return
+        assert self._cancel is not None
+        detail = {"reason": reason}
+        self._track.record(NewEvent("search_cancelled", actor, snap_id=self.status.id, detail=detail))
+        self._cancel()
+        self.status = replace(self.status, state="cancelled")
+
+    def put_away(self) -> None:
+        """Forget the candidates of a search that has ended."""
+        if self.status is not None and not self.status.is_live:
+            self.status = None
+
+    def _began(self, order: SearchOrder) -> None:
+        if self._is_current(order):
+            assert self.status is not None
+            self.status = replace(self.status, state="running")
+
+    def _ended(self, order: SearchOrder, outcome: SearchResult | SnapFailure) -> None:
+        if not self._is_current(order):
+            return
+        assert self.status is not None
+        try:
+            self._track.record(_outcome_event(order, outcome))
+        except Exception as error:
+            message = f"The candidates could not be saved: {error}"
+            self.status = replace(self.status, state="failed", message=message)
+            raise
+        if isinstance(outcome, SnapFailure):
+            self.status = replace(self.status, state="failed", message=str(outcome))
+        else:
+            self.status = replace(self.status, state="done", progress=1.0)
+
+    def _is_current(self, order: SearchOrder) -> bool:
+        return self.status is not None and self.status.id == order.search_id and self.status.is_live
+
+
+def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> NewEvent:
+    if isinstance(outcome, SnapFailure):
+        detail = {"message": str(outcome)}
+        return NewEvent("search_failed", Actor.MACHINE, snap_id=order.search_id, detail=detail)
+    return NewEvent(
+        kind="search_done",
+        actor=Actor.MACHINE,
+        snap_id=order.search_id,
+        duration_seconds=outcome.seconds,
+        detail={
+            "candidates": [
+                {"T_camera_object": candidate.T_camera_object.tolist(), "weight": candidate.weight}
+                for candidate in outcome.hypotheses
+            ],
+            "version": outcome.version,
+            "hardware": outcome.hardware,
+        },
+    )

@@ -1,0 +1,80 @@
+/** How far off the machine's pose may be, and what depth cannot tell about it. */
+
+import { get, put } from "../api.js";
+import { byId, element, setText } from "../dom.js";
+
+const DEGREES = 180 / Math.PI;
+const ANY_TURN = 150; // degrees to either side: as good as any
+const REMEMBERED = "snap6d.uncertainty";
+
+/** A part of the labelling page. */
+export function uncertaintyPart(page) {
+  const isShown = () => localStorage.getItem(REMEMBERED) !== "hidden";
+  let viewIsThere = false;
+  let snapId = null;
+  byId("hide-uncertainty").addEventListener("click", toggle);
+  showButton();
+
+  function draw({ estimate_snap_id: newest }, before) {
+    if (!before) tellView();
+    if (newest === snapId) return;
+    snapId = newest;
+    if (snapId === null) byId("uncertainty").hidden = true;
+    else load(snapId).catch(page.message.problem);
+  }
+
+  async function load(wanted) {
+    const uncertainty = await get(page.path("uncertainty"));
+    if (wanted !== snapId || uncertainty.snap_id !== snapId) return;
+    const { translation, rotation, unknown } = uncertainty;
+    setText(byId("uncertainty-size"), `± ${millimetres(translation)}, ± ${degrees(rotation)}`);
+    byId("unknown-motions").replaceChildren(...unknown.map((motion) => element("li", {}, sentence(motion))));
+    byId("uncertainty").hidden = false;
+  }
+
+  function attach() {
+    viewIsThere = true;
+    tellView();
+  }
+
+  /** The view is the server's: it is told what this page remembers. */
+  function tellView() {
+    if (!viewIsThere || !page.registration()) return;
+    put(page.path("uncertainty"), { shown: isShown() }).catch(page.message.problem);
+  }
+
+  function toggle() {
+    localStorage.setItem(REMEMBERED, isShown() ? "hidden" : "shown");
+    showButton();
+    tellView();
+  }
+
+  function showButton() {
+    setText(byId("hide-uncertainty-text"), isShown() ? "Hide" : "Show");
+  }
+
+  const bindings = [
+    { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, machine: true },
+  ];
+  return { bindings, attach, draw };
+}
+
+function sentence({ kind, motion, extent }) {
+  const isTurn = motion === "turn";
+  if (kind === "other mode") {
+    return isTurn
+      ? `Turned by ${degrees(extent)} about the blue axis it fits as well.`
+      : `Shifted by ${millimetres(extent)} along the blue axis it fits as well.`;
+  }
+  if (!isTurn) return `Depth does not tell where along the blue axis it lies: ± ${millimetres(extent)}.`;
+  if (extent * DEGREES >= ANY_TURN) return "Depth does not tell the turn about the blue axis at all.";
+  return `Depth does not tell the turn about the blue axis: ± ${degrees(extent)}.`;
+}
+
+const millimetres = (metres) => `${digits(metres * 1000)} mm`;
+const degrees = (radians) => `${digits(radians * DEGREES)}°`;
+
+/** As many as make sense. */
+function digits(number) {
+  return number.toFixed(number < 9.95 ? 1 : 0);
+}

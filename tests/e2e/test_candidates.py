@@ -1,0 +1,119 @@
+"""Finding the object, choosing between poses, and what is unsure about one, with real mouse and keys."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from registration_core import pose
+from tests.e2e.conftest import take_picture
+from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.test_machine import GHOST_HIDDEN, GHOST_SHOWN
+from tests.e2e.test_readme import true_pose
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+
+def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Callable[[str], Page]) -> None:
+    desk = Desk(open_page(server.new_link("finder")), server, "mug")
+    page = desk.page
+    start = desk.pose
+    page.keyboard.press("f")
+    (found,) = desk.events("search_done")
+    cards = page.locator("#candidate-list button")
+    expect(cards).to_have_count(len(found["detail"]["candidates"]), timeout=30_000)
+    expect(cards.first).to_have_attribute("aria-pressed", "true")
+    desk.frame.wait_for_function(GHOST_SHOWN)
+    assert np.allclose(desk.pose, start)
+    desk.frame.evaluate(NEXT_PICTURE)
+    take_picture(page, "label-find")
+    page.emulate_media(color_scheme="dark")
+    take_picture(page, "label-find-dark")
+    page.emulate_media(color_scheme="light")
+
+    page.keyboard.press("]")
+    expect(cards.nth(1)).to_have_attribute("aria-pressed", "true")
+    wait_for_preview(desk, found["detail"]["candidates"][1])
+    page.keyboard.press("[")
+    expect(cards.first).to_have_attribute("aria-pressed", "true")
+    wait_for_preview(desk, found["detail"]["candidates"][0])
+    page.reload()
+    expect(cards.first).to_have_attribute("aria-pressed", "true", timeout=30_000)
+    page.keyboard.press("y")
+    (taken,) = desk.events("set_pose")
+    assert taken["detail"] == {"technique": "proposal", "stems_from": found["snap_id"]}
+    expect(page.locator("#candidates")).to_be_hidden()
+    truth = true_pose(desk.task["object"]["obj_id"])
+    assert pose.distance(desk.pose, truth).translation < 0.01
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.allclose(desk.pose, start)
+
+    page.locator("#find").click()
+    desk.events("search_done", 2)
+    expect(page.locator("#candidates")).to_be_visible(timeout=30_000)
+    page.keyboard.press("Escape")
+    expect(page.locator("#candidates")).to_be_hidden()
+    assert desk.state["search"] is None and desk.state["preview"] is None
+
+
+def test_modes_and_what_depth_cannot_tell_are_shown(server: Server, open_page: Callable[[str], Page]) -> None:
+    desk = Desk(open_page(server.new_link("doubter")), server, "mug")
+    page = desk.page
+    truth = true_pose(desk.task["object"]["obj_id"])
+    near = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
+    assert page.request.put(f"{desk.url}/pose", data={"T_world_object": near.tolist()}).ok
+    assert page.request.post(f"{desk.url}/snaps", data={"seed": 1}).ok
+    (applied,) = desk.events("snap_applied")
+    cards = page.locator("#candidate-list button")
+    expect(page.locator("#candidates-title")).to_contain_text("The depth fits", timeout=30_000)
+    expect(page.locator("#uncertainty-size")).to_contain_text("mm, ±")
+    expect(page.locator("#unknown-motions")).to_contain_text("blue axis")
+    desk.frame.wait_for_function(shown("/uncertainty/motions"))
+    desk.frame.evaluate(NEXT_PICTURE)
+    take_picture(page, "label-uncertainty")
+
+    page.keyboard.press("]")
+    expect(cards.nth(1)).to_have_attribute("aria-pressed", "true")
+    desk.frame.wait_for_function(GHOST_SHOWN)
+    page.keyboard.press("Shift+v")
+    expect(page.locator("#hide-uncertainty")).to_contain_text("Show")
+    desk.frame.wait_for_function(f"() => !({shown('/uncertainty')})()")
+    page.emulate_media(color_scheme="dark")
+    take_picture(page, "label-modes-dark")
+    page.keyboard.press("Escape")
+    expect(cards.nth(1)).to_have_attribute("aria-pressed", "false")
+    desk.frame.wait_for_function(GHOST_HIDDEN)
+
+    page.reload()
+    expect(page.locator("#candidates-title")).to_contain_text("The depth fits", timeout=60_000)
+    expect(page.locator("#hide-uncertainty")).to_contain_text("Show")
+    cards.nth(1).dblclick()
+    (_, taken) = desk.events("set_pose", 2)
+    assert taken["detail"] == {"technique": "mode", "stems_from": applied["snap_id"]}
+    expect(page.locator("#candidates")).to_be_hidden()
+    expect(page.locator("#uncertainty")).to_be_hidden()
+    page.keyboard.press("Control+z")
+    desk.events("undo")
+    assert np.allclose(desk.pose, applied["T_after"])
+    expect(page.locator("#candidates")).to_be_visible(timeout=30_000)
+
+
+def shown(node: str) -> str:
+    """Tells in the 3-D view whether a node is there and visible."""
+    return f"() => window.__viserMutable.nodeRefFromName[{node!r}]?.visible === true"
+
+
+def wait_for_preview(desk: Desk, candidate: dict) -> None:
+    """Return when the server knows that this one is looked at."""
+    frame_id, scene_id = desk.state["frame_id"], desk.task["scene"]["id"]
+    frames = desk.page.request.get(f"{desk.root}/api/scenes/{scene_id}").json()["frames"]
+    T_world_camera = next(np.array(one["T_world_camera"]) for one in frames if one["id"] == frame_id)
+    wanted = T_world_camera @ np.array(candidate["T_camera_object"])
+    deadline = time.monotonic() + 60
+    while desk.state["preview"] is None or not np.allclose(desk.state["preview"], wanted):
+        assert time.monotonic() < deadline
+        desk.page.wait_for_timeout(50)
