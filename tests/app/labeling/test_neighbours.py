@@ -128,3 +128,13 @@ def test_an_object_that_was_reopened_gets_its_handles_back(services, seat):
                     m["name"] == "/object" and m["updates"].get("disable_axes") is locked
                 ),
             )
+
+
+def test_who_cannot_be_told_does_not_take_back_what_happened(services, seat, ann, monkeypatch):
+    def broken() -> tuple[()]:
+        raise OSError("no such mesh")
+
+    monkeypatch.setattr(seat.neighbours, "_read", broken)
+    block = submitted(services, 2, ann, true_pose(BLOCK))
+    assert block.session.snapshot().state == "submitted"
+    assert block.neighbours.things[1].state == "submitted"
