@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from registration_core import pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.test_labelling import NEXT_PICTURE, Desk
-from tests.e2e.test_machine import GHOST_SHOWN
+from tests.e2e.test_machine import GHOST_HIDDEN, GHOST_SHOWN
 from tests.e2e.test_readme import true_pose
 from tests.processes import Server
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.e2e
 
 
 def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("finder")), server, "mug")
+    desk = Desk(open_page(server.new_link("finder")), server, "box")
     page = desk.page
     start = desk.pose
     page.keyboard.press("f")
@@ -61,7 +61,7 @@ def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Calla
 
 
 def test_modes_and_what_depth_cannot_tell_are_shown(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("doubter")), server, "mug")
+    desk = Desk(open_page(server.new_link("doubter")), server, "bottle")
     page = desk.page
     truth = true_pose(desk.task["object"]["obj_id"])
     near = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
