@@ -18,7 +18,7 @@ pytestmark = pytest.mark.e2e
 
 
 def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("finder")), server, "mug")
+    desk = Desk(open_page(server.new_link("finder")), server, "box")
     page = desk.page
     start = desk.pose
     page.keyboard.press("f")
@@ -61,7 +61,7 @@ def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Calla
 
 
 def test_modes_and_what_depth_cannot_tell_are_shown(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("doubter")), server, "mug")
+    desk = Desk(open_page(server.new_link("doubter")), server, "bottle")
     page = desk.page
     truth = true_pose(desk.task["object"]["obj_id"])
     near = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
