@@ -19,8 +19,8 @@ from registration_core.rasterizer import draw_mesh
 Array = NDArray[np.float64]
 
 TOLERANCE = 0.005
-"""Metres that a match may be off, up to a distance of 1 m; beyond it grows with the square of the distance, as
-the noise of depth sensors does."""
+"""Metres that a match may be off, up to a distance of 1 m; beyond, it grows with the square of the distance,
+as the noise of depth sensors does."""
 
 
 class Verdict(IntEnum):

@@ -17,7 +17,10 @@ from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog, NewEvent
 from app.labeling.chair import Chair
+from app.labeling.coloring import Coloring
+from app.labeling.depth_reading import DepthReading, DepthView
 from app.labeling.history import replay
+from app.labeling.layers import Layers
 from app.labeling.machine import SamePose
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
@@ -53,6 +56,7 @@ class Seat:
     session: LabelingSession
     frames: dict[int, Frame]
     model: ObjectModel
+    reading: DepthReading
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
@@ -205,7 +209,13 @@ class Desk:
             record_event=record_event,
             request_snap=request_snap,
         )
-        return Seat(registration, session, frames, model)
+
+        def depth_view(frame_id: int) -> DepthView:
+            frame = frames[frame_id]
+            return DepthView(self._data.depth(frame), camera_of(frame), np.array(frame.T_world_camera))
+
+        reading = DepthReading(lambda: self._data.thinned_model(task.object), depth_view)
+        return Seat(registration, session, frames, model, reading)
 
     def _request_snap(
         self,
@@ -260,6 +270,9 @@ class Desk:
         shown = _Shown(view, self._data, seat.frames)
         shown.update(state)
         seat.session.subscribe(shown.update)
+        coloring = Coloring(seat.reading, view.show_on_object)
+        coloring.update(state)
+        seat.session.subscribe(coloring.update)
         return view
 
     def _first_view(self, seat: Seat, state: SessionState) -> FirstView:
@@ -282,6 +295,7 @@ class _Shown:
         self._frames = frames
         self._frame_id: int | None = None
         self._ghost: Offer | None = None
+        self._layers = Layers()
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -294,6 +308,9 @@ class _Shown:
         if ghost is not self._ghost:
             self._ghost = ghost
             self._view.show_ghost(ghost.T_world_object if ghost else None)
+        if state.layers != self._layers:
+            self._layers = state.layers
+            self._view.show_layers(state.layers)
         if state.state != "open":
             self._view.lock_object()
 

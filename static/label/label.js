@@ -19,6 +19,7 @@ import { numbersPart } from "./numbers.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
+import { seeingPart } from "./seeing.js";
 import { followRegistration } from "./stream.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
@@ -45,6 +46,7 @@ const PARTS = [
   numbersPart(page),
   placePart(page),
   precisionPart(page),
+  seeingPart(page),
   viewsPart(page),
 ];
 
