@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 TOLERANCE = 0.005
 """Metres that a match may be off, up to a distance of 1 m; beyond, it grows with the square of the distance,
 as the noise of depth sensors does."""
+HIDDEN = 0.030
+"""Metres: what was measured so far in front of the object hides it, as far as a count of matches goes."""
+LEAST_SEEN = 0.05
+"""Share of the surface that must be measured and not hidden, or a share of matches would say nothing."""
 
 
 class Verdict(IntEnum):
@@ -55,9 +59,11 @@ class DepthAgreement:
 
     @property
     def inlier_share(self) -> float | None:
-        """Matches among the pixels with a measurement; None where there is none."""
-        measured = np.count_nonzero(self.verdicts != Verdict.NO_DATA)
-        return np.count_nonzero(self.verdicts == Verdict.MATCH) / measured if measured else None
+        """Matches among the pixels that were measured and are not `HIDDEN`; None where these are too few."""
+        seen = np.count_nonzero((self.verdicts != Verdict.NO_DATA) & (self.gap >= -HIDDEN))
+        if seen == 0 or seen < LEAST_SEEN * len(self.verdicts):
+            return None
+        return np.count_nonzero(self.verdicts == Verdict.MATCH) / seen
 
     @property
     def median_residual(self) -> float | None:

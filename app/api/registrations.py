@@ -64,7 +64,9 @@ class LiveOut(BaseModel):
 class AgreementOut(BaseModel):
     """How well the shown frame's depth agrees with the object where it is now."""
 
-    inlier_share: float | None = Field(description="Matches among the pixels with depth; null without any.")
+    inlier_share: float | None = Field(
+        description="Matches among the pixels with depth that nothing hides; null where these are too few."
+    )
     median_residual: float | None = Field(description="Of the matches, metres, without sign.")
     match: float = Field(description="Like the three below a share of the object's visible surface.")
     in_front: float = Field(description="The object is nearer than what was measured.")

@@ -24,10 +24,8 @@ MACHINE_COLOR = (108, 192, 255)
 MESH_OPACITY = 0.55
 GHOST_OPACITY = 0.6
 GHOST_SIZE = 1.03
-"""Times the object's own, since measured points would hide a ghost that lies where it should."""
-SURFACE_SIZE = 1.01
-"""The same of points on the object's surface, which lie close to the measured ones."""
-SURFACE_POINT = 0.006
+"""Times the object's own, since measured points would hide what lies where it should."""
+SURFACE_POINT = 0.008
 """Size of such a point as a share of the object's diameter."""
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
@@ -107,7 +105,7 @@ class SceneView:
 
     def show_on_object(self, points: Array, colors: NDArray[np.uint8]) -> None:
         """Show points (N, 3) in the object's frame, metres, in place of those before; the mesh has them."""
-        on_mesh = (SURFACE_SIZE * (points - self._model.centre)).astype(np.float16)
+        on_mesh = (GHOST_SIZE * (points - self._model.centre)).astype(np.float16)
         if self._on_object is None:
             self._on_object = self._server.scene.add_point_cloud(
                 "/object/mesh/surface",

@@ -1,5 +1,5 @@
-"""Seeing whether a pose is right: depth agreement as colours and numbers, what can be put away, and how often the
-outline is redrawn in a drag.
+"""Seeing whether a pose is right: depth agreement as colours and numbers, what can be put away, and how often
+the outline is redrawn in a drag.
 """
 
 import time
@@ -10,11 +10,12 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from registration_core import pose
-from tests.app.waiting import wait_until
+from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, pixel
 from tests.e2e.test_image import Image
 from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.test_readme import true_pose
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -58,16 +59,16 @@ def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
     page.mouse.down()
     wait_until(lambda: desk.state["dragging"], "the drag")
     before, began = page.evaluate("redraws"), time.monotonic()
-    moves = 0
-    while (passed := time.monotonic() - began) < DRAG_SECONDS:
+    moves = redraws = 0
+    passed = 0.0
+    while passed < DRAG_SECONDS or (redraws < 5 and passed < LONGEST):  # however busy the machine is
         page.mouse.move(*(start + (end - start) * abs(np.sin(passed))))
-        moves += 1
-    redraws = page.evaluate("redraws") - before
+        moves, passed = moves + 1, time.monotonic() - began
+        redraws = page.evaluate("redraws") - before
+    assert desk.state["dragging"]
     page.mouse.up()
-    print(
-        f"{moves / passed:.1f} moves of the mouse and {redraws / passed:.1f} redraws of the outline a second"
-    )
-    assert redraws > 3
+    print(f"{moves / passed:.1f} moves and {redraws / passed:.1f} redraws of the outline a second")
+    assert redraws >= 5
 
 
 def dominant(image: Image) -> str:
@@ -87,19 +88,18 @@ def dominant(image: Image) -> str:
 
 def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
     desk, page = image.desk, image.page
-    assert page.request.post(f"{desk.url}/reset").ok
-    page.keyboard.press("Space")
-    desk.events("snap_applied")
-    snapped = np.array(desk.state["T_camera_object"])
+    T_world_camera = np.array(image.frames[0]["T_world_camera"])
+    truth = pose.inverse(T_world_camera) @ true_pose(desk.task["object"]["obj_id"])
+    image.put(truth)
     share = page.locator("#agreement-share")
     expect(share).to_have_text(f"{100 * desk.state['agreement']['inlier_share']:.0f} %")
-    assert desk.state["agreement"]["inlier_share"] > 0.8
-    assert desk.state["agreement"]["median_residual"] < 0.003
+    assert desk.state["agreement"]["inlier_share"] > 0.9
+    assert desk.state["agreement"]["median_residual"] < 0.002
     expect(page.locator("#verdicts")).to_be_hidden()
     page.keyboard.press("r")
     expect(page.locator("#verdicts")).to_be_visible()
     page.keyboard.press("z")
-    for T, verdict in ((snapped, "match"), (NEARER @ snapped, "in_front"), (FARTHER @ snapped, "behind")):
+    for T, verdict in ((truth, "match"), (NEARER @ truth, "in_front"), (FARTHER @ truth, "behind")):
         image.put(T)
         wait_until(lambda verdict=verdict: dominant(image) == verdict, f"the colour of {verdict}", 40)
         shown = desk.state["agreement"][verdict]
@@ -108,6 +108,7 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
         assert shown > 0.7
         desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
         desk.frame.evaluate(NEXT_PICTURE)
+        page.emulate_media(color_scheme="dark" if verdict == "behind" else "light")
         take_picture(page, f"label-agreement-{verdict}")
     page.get_by_role("button", name="Agreement").click()
     expect(page.locator("#verdicts")).to_be_hidden()

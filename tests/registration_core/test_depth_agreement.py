@@ -54,12 +54,14 @@ def test_holes_are_no_data_and_no_evidence() -> None:
     assert depth_agreement(BOX, np.zeros_like(DEPTH), CAMERA, HERE).inlier_share is None
 
 
-def test_behind_what_stands_in_front() -> None:
+def test_what_stands_clearly_in_front_hides_and_is_no_evidence() -> None:
     hidden = DEPTH.copy()
     hidden[:80] = 0.3
     agreement = depth_agreement(BOX, hidden, CAMERA, HERE)
     assert shares(agreement) == pytest.approx({"MATCH": 0.5, "BEHIND": 0.5}, abs=0.02)
-    assert agreement.inlier_share == pytest.approx(0.5, abs=0.02)
+    assert agreement.inlier_share == 1.0  # of what can be seen
+    hidden[:] = 0.3
+    assert depth_agreement(BOX, hidden, CAMERA, HERE).inlier_share is None
     assert agreement.median_residual == pytest.approx(0.0, abs=1e-6)  # of the matches alone
 
 
