@@ -1,4 +1,4 @@
-"""The mesh from which a page draws an object's outline: coarse enough to be quick, and compact."""
+"""The mesh that is drawn many times a second, by a page for the outline and here: coarse enough for it."""
 
 import numpy as np
 
@@ -12,11 +12,9 @@ COARSER = 1.25
 """By how much a cell grows from one try to the next."""
 
 
-def outline_mesh(model: ObjectModel) -> bytes:
-    """The mesh as bytes, little endian: the numbers V of vertices and F of faces (uint32 each), the vertices
-    (V, 3) float32 in metres, in the object's frame, and the faces (F, 3) uint32.
-
-    A mesh of more than `MOST_FACES` faces is thinned; its surface then moves by less than half a cell.
+def thinned(model: ObjectModel) -> ObjectModel:
+    """The same mesh with equal vertices merged; one of more than `MOST_FACES` faces is thinned out, and its
+    surface moves by less than half a cell.
     """
     fine_vertices, fine_faces = merged(model.vertices.astype(np.float32), model.faces)
     vertices, faces = fine_vertices, fine_faces
@@ -24,5 +22,14 @@ def outline_mesh(model: ObjectModel) -> bytes:
     while len(faces) > MOST_FACES:
         vertices, faces = clustered(fine_vertices, fine_faces, cell)
         cell *= COARSER
-    sizes = np.array([len(vertices), len(faces)], dtype="<u4")
-    return b"".join([sizes.tobytes(), vertices.astype("<f4").tobytes(), faces.astype("<u4").tobytes()])
+    return ObjectModel(vertices.astype(np.float64), faces, model.symmetries)
+
+
+def packed(model: ObjectModel) -> bytes:
+    """The mesh as bytes, little endian: the numbers V of vertices and F of faces (uint32 each), the vertices
+    (V, 3) float32 in metres, in the object's frame, and the faces (F, 3) uint32.
+    """
+    sizes = np.array([len(model.vertices), len(model.faces)], dtype="<u4")
+    return b"".join(
+        [sizes.tobytes(), model.vertices.astype("<f4").tobytes(), model.faces.astype("<u4").tobytes()]
+    )

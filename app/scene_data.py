@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from app.outline_mesh import thinned
 from app.storage import FileStore
 from app.tables import Frame, Object
 from registration_core import Intrinsics, ObjectModel, Symmetries, pose
@@ -37,11 +38,16 @@ class SceneData:
     def __init__(self, files: FileStore) -> None:
         self._files = files
         self._model = lru_cache(KEPT_MODELS)(self._load_model)
+        self._thinned = lru_cache(KEPT_MODELS)(thinned)
         self._depth = lru_cache(KEPT_FRAMES)(self._load_depth)
 
     def model(self, item: Object) -> ObjectModel:
         """The object's mesh, in metres."""
         return self._model(item.mesh_hash, item.mesh_format, symmetries_from_json(item.symmetries))
+
+    def thinned_model(self, item: Object) -> ObjectModel:
+        """The same, coarse enough to be drawn many times a second."""
+        return self._thinned(self.model(item))
 
     def depth(self, frame: Frame) -> NDArray[np.float32]:
         """The frame's depth image (H, W), metres, 0 where there is none; not to be written to."""

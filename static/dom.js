@@ -43,3 +43,8 @@ export function picture(url, className, { lazy = false } = {}) {
 export function setText(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
+
+/** A colour of the style sheet as [red, green, blue] from 0 to 1. */
+export function rgb(color) {
+  return color.match(/[\d.]+/g).slice(0, 3).map((value) => value / 255);
+}

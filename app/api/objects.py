@@ -19,7 +19,7 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.scenes import FOREVER
-from app.outline_mesh import outline_mesh
+from app.outline_mesh import packed
 from app.services import Services
 from app.tables import Object
 from registration_core.object_model import read_mesh
@@ -76,7 +76,7 @@ def get_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Re
 @router.get("/{object_id}/outline.mesh", response_class=Response)
 def get_outline_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
     """The mesh thinned for drawing outlines: uint32 V and F, float32 (V, 3) in metres, uint32 (F, 3)."""
-    content = outline_mesh(services.data.model(_object(services, object_id)))
+    content = packed(services.data.thinned_model(_object(services, object_id)))
     return Response(content, media_type="application/octet-stream", headers=FOREVER)
 
 

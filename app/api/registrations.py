@@ -16,9 +16,11 @@ from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, Serv
 from app.auth import Actor
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat
+from app.labeling.layers import Layers
 from app.labeling.session import LabelingSession, SessionState
 from app.tables import Event, Pose
 from registration_core import pose
+from registration_core.depth_agreement import Verdict
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
@@ -68,6 +70,19 @@ class SearchOut(BaseModel):
     message: str | None
 
 
+class AgreementOut(BaseModel):
+    """How well the shown frame's depth agrees with the object where it is now."""
+
+    inlier_share: float | None = Field(
+        description="Matches among the pixels with depth that nothing hides; null where these are too few."
+    )
+    median_residual: float | None = Field(description="Of the matches, metres, without sign.")
+    match: float = Field(description="Like the three below a share of the object's visible surface.")
+    in_front: float = Field(description="The object is nearer than what was measured.")
+    behind: float = Field(description="The object is farther away than what was measured.")
+    no_data: float
+
+
 class RegistrationOut(BaseModel):
     """One operator's work on one task, now."""
 
@@ -85,6 +100,10 @@ class RegistrationOut(BaseModel):
     dragging: bool
     gizmo_axes: GizmoAxes
     """Along which the gizmo's arrows lie."""
+    layers: Layers
+    """What the 3-D view shows."""
+    agreement: AgreementOut | None
+    """Nothing where no part of the object is in the frame."""
     saved: bool
     """Whether all of it is on the disk: a drag is when it ends."""
     snap: SnapOut | None
@@ -181,6 +200,13 @@ def show_frame(body: FrameChoice, seat: SeatDep, identity: IdentityDep) -> Regis
 def set_live(body: LiveChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Turn live snapping on or off."""
     seat.session.set_live(body.on, identity.actor)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/layers")
+def show_layers(body: Layers, seat: SeatDep) -> RegistrationOut:
+    """Let the 3-D view show or hide the cloud, the mesh, and the colours of depth agreement on it."""
+    seat.session.show_layers(body)
     return registration_out(seat)
 
 
@@ -283,6 +309,8 @@ def registration_out(seat: Seat) -> RegistrationOut:
         can_redo=state.can_redo,
         dragging=state.dragging,
         gizmo_axes=state.gizmo_axes,
+        layers=state.layers,
+        agreement=_agreement_out(seat, state),
         saved=not state.dragging,
         snap=_snap_out(state),
         offer=_offer_out(state),
@@ -302,6 +330,20 @@ def _snap_out(state: SessionState) -> SnapOut | None:
         return None
     return SnapOut(
         id=snap.id, asked_by=snap.asked_by, state=snap.state, progress=snap.progress, message=snap.message
+    )
+
+
+def _agreement_out(seat: Seat, state: SessionState) -> AgreementOut | None:
+    agreement = seat.reading.of(state.frame_id, state.T_world_object)
+    if not len(agreement.verdicts):
+        return None
+    return AgreementOut(
+        inlier_share=agreement.inlier_share,
+        median_residual=agreement.median_residual,
+        match=agreement.share(Verdict.MATCH),
+        in_front=agreement.share(Verdict.IN_FRONT),
+        behind=agreement.share(Verdict.BEHIND),
+        no_data=agreement.share(Verdict.NO_DATA),
     )
 
 

@@ -3,6 +3,7 @@
 import io
 from typing import Any
 
+import numpy as np
 from fastapi import APIRouter, HTTPException, Response
 from fastapi.responses import FileResponse
 from PIL import Image
@@ -51,6 +52,7 @@ class FrameOut(BaseModel):
     """A raw depth value times this is millimetres."""
     color_url: str | None
     depth_url: str
+    raw_depth_url: str
 
 
 class SceneOut(BaseModel):
@@ -109,6 +111,14 @@ def get_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Fi
     return FileResponse(services.files.path(frame.depth_hash), media_type="image/png", headers=FOREVER)
 
 
+@router.get("/frames/{frame_id}/depth.raw", response_class=Response)
+def get_raw_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+    """The values of `depth.png` as uint16, little endian, row by row: browsers read but 8 bits of a PNG."""
+    with Image.open(services.files.path(_frame(services, frame_id).depth_hash)) as image:
+        content = np.asarray(image).astype("<u2").tobytes()
+    return Response(content, media_type="application/octet-stream", headers=FOREVER)
+
+
 def _frame(services: Services, frame_id: int) -> Frame:
     with services.database.read() as session:
         return row_or_404(session, Frame, frame_id)
@@ -136,4 +146,5 @@ def _frame_out(row: Frame) -> dict[str, Any]:
         "depth_scale": row.depth_scale,
         "color_url": f"/api/frames/{row.id}/color.png" if row.color_hash else None,
         "depth_url": f"/api/frames/{row.id}/depth.png",
+        "raw_depth_url": f"/api/frames/{row.id}/depth.raw",
     }

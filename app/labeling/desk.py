@@ -17,7 +17,10 @@ from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import STATE_AFTER, EventLog, NewEvent
 from app.labeling.chair import Chair
+from app.labeling.coloring import Coloring
+from app.labeling.depth_reading import DepthReading, DepthView
 from app.labeling.history import replay
+from app.labeling.layers import Layers
 from app.labeling.machine import SamePose
 from app.labeling.neighbours import Neighbours
 from app.labeling.scene_things import things_of_scene
@@ -58,6 +61,7 @@ class Seat:
     frames: dict[int, Frame]
     model: ObjectModel
     neighbours: Neighbours
+    reading: DepthReading
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
@@ -238,7 +242,13 @@ class Desk:
             known_objects=lambda: neighbours.known,
             request_search=request_search,
         )
-        return Seat(registration, session, frames, model, neighbours)
+
+        def depth_view(frame_id: int) -> DepthView:
+            frame = frames[frame_id]
+            return DepthView(self._data.depth(frame), camera_of(frame), np.array(frame.T_world_camera))
+
+        reading = DepthReading(lambda: self._data.thinned_model(task.object), depth_view)
+        return Seat(registration, session, frames, model, neighbours, reading)
 
     def _renew_scene(self, scene_id: int) -> None:
         """Tell all who work in a scene that something in it was submitted, skipped or reopened."""
@@ -340,6 +350,9 @@ class Desk:
         shown.update(state)
         seat.session.subscribe(shown.update)
         seat.neighbours.subscribe(view.neighbours.show)
+        coloring = Coloring(seat.reading, view.show_on_object)
+        coloring.update(state)
+        seat.session.subscribe(coloring.update)
         return view
 
     def _first_view(self, seat: Seat, state: SessionState) -> FirstView:
@@ -371,6 +384,7 @@ class _Shown:
         self._locked = False
         self._ghost: np.ndarray | None = None
         self._snap_id: str | None = None
+        self._layers = Layers()
 
     def update(self, state: SessionState) -> None:
         """Draw what changed."""
@@ -391,6 +405,9 @@ class _Shown:
         if locked is not self._locked:
             self._locked = locked
             self._view.lock_object(locked)
+        if state.layers != self._layers:
+            self._layers = state.layers
+            self._view.show_layers(state.layers)
 
     def _show_cloud(self, frame: Frame) -> None:
         cloud = self._data.cloud(frame)

@@ -20,6 +20,7 @@ from app.event_log import STATE_AFTER, NewEvent
 from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
+from app.labeling.layers import Layers
 from app.labeling.machine import Machine, SamePose
 from app.labeling.search import Region, RequestSearch, Search, SearchOrder
 from app.labeling.snap_exchange import (
@@ -54,6 +55,7 @@ class SessionState:
     can_redo: bool
     dragging: bool
     gizmo_axes: GizmoAxes
+    layers: Layers
     snap: SnapStatus | None
     offer: Offer | None
     is_live: bool
@@ -122,6 +124,7 @@ class LabelingSession:
         self._lock = threading.RLock()
         self._listeners: list[Callable[[SessionState], None]] = []
         self._gizmo_axes: GizmoAxes = "object"
+        self._layers = Layers()
         self.last_used = time.monotonic()
 
     # -- what is seen ------------------------------------------------------------------------------
@@ -141,6 +144,7 @@ class LabelingSession:
                 can_redo=self._is_open and history.can_redo,
                 dragging=track.drag is not None,
                 gizmo_axes=self._gizmo_axes,
+                layers=self._layers,
                 snap=self._machine.status,
                 offer=self._machine.offer,
                 is_live=self._machine.is_live,
@@ -238,6 +242,12 @@ class LabelingSession:
         with self._lock:
             self._require_free_hands()
             self._gizmo_axes = axes
+            self._changed()
+
+    def show_layers(self, layers: Layers) -> None:
+        """Let the view show these; that moves nothing, and may be done at any time."""
+        with self._lock:
+            self._layers = layers
             self._changed()
 
     def reset(self, actor: Actor) -> None:

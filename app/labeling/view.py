@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from viser import _messages
 
 from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.layers import Layers
 from app.labeling.neighbour_view import NeighbourView
 from app.labeling.uncertainty_view import UncertaintyView
 from app.labeling.viewpoint import Viewpoint
@@ -25,7 +26,9 @@ MACHINE_COLOR = (108, 192, 255)
 MESH_OPACITY = 0.55
 GHOST_OPACITY = 0.6
 GHOST_SIZE = 1.03
-"""Times the object's own, since measured points would hide a ghost that lies where it should."""
+"""Times the object's own, since measured points would hide what lies where it should."""
+SURFACE_POINT = 0.008
+"""Size of such a point as a share of the object's diameter."""
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
 STEP_BACK = 1.15
@@ -73,6 +76,9 @@ class SceneView:
         self._model = model
         self._ghost: viser.MeshHandle | None = None
         self.uncertainty = UncertaintyView(self._server, MACHINE_COLOR, model.diameter)
+        self._cloud: viser.PointCloudHandle | None = None
+        self._on_object: viser.PointCloudHandle | None = None
+        self._layers = Layers()
         self._gizmo, self._mesh = self._add_object(T_world_object)
         self.neighbours = NeighbourView(self._server)
         self._follow_drags(drag)
@@ -84,9 +90,37 @@ class SceneView:
 
     def show_cloud(self, points: NDArray[np.float32], colors: NDArray[np.uint8], point_size: float) -> None:
         """Show a point cloud (N, 3) in the world, metres, in place of the one before."""
-        self._server.scene.add_point_cloud(
-            "/cloud", points, colors, point_size=point_size, point_shape="circle", precision="float32"
+        self._cloud = self._server.scene.add_point_cloud(
+            "/cloud",
+            points,
+            colors,
+            point_size=point_size,
+            point_shape="circle",
+            precision="float32",
+            visible=self._layers.cloud,
         )
+
+    def show_layers(self, layers: Layers) -> None:
+        """Show or hide cloud and mesh, and what lies on the mesh with it; the gizmo stays."""
+        self._layers = layers
+        self._mesh.visible = layers.mesh
+        if self._cloud is not None:
+            self._cloud.visible = layers.cloud
+
+    def show_on_object(self, points: Array, colors: NDArray[np.uint8]) -> None:
+        """Show points (N, 3) in the object's frame, metres, in place of those before; the mesh has them."""
+        on_mesh = (GHOST_SIZE * (points - self._model.centre)).astype(np.float16)
+        if self._on_object is None:
+            self._on_object = self._server.scene.add_point_cloud(
+                "/object/mesh/surface",
+                on_mesh,
+                colors,
+                point_size=SURFACE_POINT * self._model.diameter,
+                point_shape="circle",
+                point_shading="flat",
+            )
+        with self._server.atomic():
+            self._on_object.points, self._on_object.colors = on_mesh, colors
 
     def move_object(self, T_world_object: Array, gizmo_axes: GizmoAxes = "object") -> None:
         """Put object and gizmo at a pose. Not while a drag goes on: the page would overwrite it.

@@ -1,7 +1,6 @@
 /** A pose to choose, as a picture: a piece of the colour image with the object's outline drawn in. */
 
-import { element } from "../dom.js";
-import { colorOf } from "./image.js";
+import { element, rgb } from "../dom.js";
 import { extentInPicture, shownCamera } from "./outline.js";
 
 const FILLED = 0.62; // share of the picture that the object takes, so that its surroundings are seen
@@ -30,18 +29,18 @@ export function candidateCard(candidate, index, frame, { choose, take }) {
 }
 
 /** Draws a card that is on the page. */
-export function drawCard({ T_camera_object: T, frame, canvas, image }, { mesh, drawMesh, blend }) {
+export function drawCard({ T_camera_object: T, frame, canvas, image }, { mesh, drawOn, blend }) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   const all = { left: 0, top: 0, right: frame.width, bottom: frame.height };
   const view = around(extentInPicture(mesh, T, frame.intrinsics) ?? all, width, height);
   image.style.transform = `translate(${view.left}px, ${view.top}px) scale(${view.scale})`;
-  if (!drawMesh) return;
+  if (!drawOn) return;
   const unit = Math.min(devicePixelRatio, 2);
   canvas.width = Math.round(width * unit);
   canvas.height = Math.round(height * unit);
   const { scale, left, top } = view;
   const camera = shownCamera(frame.intrinsics, { scale: scale * unit, left: left * unit, top: top * unit });
-  drawMesh(canvas, { camera, T, color: colorOf(canvas), blend, unit: LINE_WIDTH * unit });
+  drawOn(canvas, { camera, T, color: rgb(getComputedStyle(canvas).color), blend, unit: LINE_WIDTH * unit });
 }
 
 /** How to show the picture so that a box of it lies in the middle: {scale, left, top}, page pixels. */

@@ -38,7 +38,7 @@ export function candidatesPart(page) {
   }
 
   async function load(wanted) {
-    const [{ mesh, drawMesh }, answer] = await Promise.all([drawing, get(wanted.url)]);
+    const [{ mesh, drawOn }, answer] = await Promise.all([drawing, get(wanted.url)]);
     if (wanted !== source) return;
     const { frame_id: frameId, poses } = posesOf(wanted, answer);
     const frame = frames.find(({ id }) => id === frameId);
@@ -46,7 +46,7 @@ export function candidatesPart(page) {
     show(withWorld.map((one, index) => candidateCard(one, index, frame, { choose, take })));
     setText(byId("candidates-title"), titleOf(wanted, poses.length));
     byId("candidates").hidden = wanted.kind === "mode" && poses.length < 2;
-    for (const card of cards) drawCard(card, { mesh, drawMesh, blend: wanted.kind === "mode" ? 0.5 : 0 });
+    for (const card of cards) drawCard(card, { mesh, drawOn, blend: wanted.kind === "mode" ? 0.5 : 0 });
     const { preview } = page.registration();
     if (preview) mark(cards.findIndex((card) => isSame(card.T_world_object, preview)));
     else if (wanted.kind === "proposal" && cards.length) choose(0);

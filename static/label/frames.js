@@ -1,10 +1,11 @@
 /** The frames of the scene as a strip of thumbnails, with the object's outline in each. */
 
 import { byId, element, picture, setText } from "../dom.js";
-import { shownCamera } from "./outline.js";
+import { resize, shownCamera } from "./outline.js";
 import { relativeTo } from "./pose.js";
 
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image
+const DRAG_PAUSE = 200; // ms between thumbnails while all the time belongs to the large image
 
 /** Makes the strip; `choose(frame)` is called with the frame that is asked for. */
 export function frameStrip(choose) {
@@ -44,7 +45,7 @@ export function frameStrip(choose) {
     if (frame) choose(frame);
   }
 
-  /** Draws {drawMesh, T_world_object, color} into the thumbnails that can be seen, and later into the others. */
+  /** Draws {drawOn, T_world_object, color, dragging} into the thumbnails that can be seen, and later into the others. */
   function draw(newlyDrawn) {
     drawn = newlyDrawn;
     for (const one of thumbnails) stale.add(one);
@@ -55,12 +56,16 @@ export function frameStrip(choose) {
   function drawNext() {
     const next = [...stale].find((one) => visible.has(one.item));
     if (!next || waiting) return;
-    waiting = requestAnimationFrame(() => {
-      waiting = 0;
-      stale.delete(next);
-      drawInto(next, drawn);
-      drawNext();
-    });
+    waiting = setTimeout(
+      () =>
+        requestAnimationFrame(() => {
+          waiting = 0;
+          stale.delete(next);
+          drawInto(next, drawn);
+          drawNext();
+        }),
+      drawn.dragging ? DRAG_PAUSE : 0,
+    );
   }
 
   function noteVisible(entries) {
@@ -82,11 +87,10 @@ function thumbnail(frame, choose) {
   return { frame, canvas, button, item: element("li", {}, button) };
 }
 
-function drawInto({ frame, canvas }, { drawMesh, T_world_object, color }) {
+function drawInto({ frame, canvas }, { drawOn, T_world_object, color }) {
   const unit = Math.min(devicePixelRatio, 2);
-  canvas.width = Math.round(canvas.clientWidth * unit);
-  canvas.height = Math.round(canvas.clientHeight * unit);
+  resize(canvas, Math.round(canvas.clientWidth * unit), Math.round(canvas.clientHeight * unit));
   const camera = shownCamera(frame.intrinsics, { scale: canvas.width / frame.width, left: 0, top: 0 });
   const T = relativeTo(frame.T_world_camera, T_world_object);
-  drawMesh(canvas, { camera, T, color, blend: 0, unit: LINE_WIDTH * unit });
+  drawOn(canvas, { camera, T, color, blend: 0, unit: LINE_WIDTH * unit });
 }

@@ -1,9 +1,10 @@
 /** The colour image of the frame, with the outline of the object or its shape on top; zoom; the other frames. */
 
 import { put } from "../api.js";
-import { byId, setText } from "../dom.js";
+import { byId, rgb, setText } from "../dom.js";
+import { depthOf } from "./depth.js";
 import { frameStrip } from "./frames.js";
-import { extentInPicture, sharedDrawing, shownCamera } from "./outline.js";
+import { extentInPicture, meshDrawing, resize, sharedDrawing, shownCamera } from "./outline.js";
 import { relativeTo } from "./pose.js";
 import { zoomable } from "./zoom.js";
 
@@ -22,8 +23,12 @@ export function imagePart(page) {
   let view = null;
   let mesh = null;
   let drawMesh = null;
+  let drawOn = null; // the thumbnails
+  let depth = null; // where its agreement is to be seen
   let registration = null;
   let waiting = 0;
+  const boxSize = { width: 0, height: 0 };
+  const colors = {};
 
   image.addEventListener("load", () => (image.hidden = false));
   image.addEventListener("error", () => (image.hidden = true));
@@ -40,7 +45,8 @@ export function imagePart(page) {
   }
 
   async function showMesh(object) {
-    ({ mesh, drawMesh } = await sharedDrawing(object.outline_mesh_url));
+    ({ mesh, drawOn } = await sharedDrawing(object.outline_mesh_url));
+    drawMesh = meshDrawing(canvas, mesh);
     byId("no-outline").hidden = drawMesh !== null;
     drawPose();
   }
@@ -56,6 +62,7 @@ export function imagePart(page) {
     registration = newest.preview ? asLookedAt(newest, frame) : newest;
     if (shown !== frame) showFrame(frame);
     canvas.dataset.source = newest.preview || newest.confidence !== null ? "machine" : "human";
+    showAgreement(newest.layers.agreement);
     drawPose();
   }
 
@@ -67,8 +74,24 @@ export function imagePart(page) {
     strip.mark(frame);
   }
 
+  /** Colours the object by how depth agrees with it, once the depth image of the frame is there. */
+  function showAgreement(isWanted) {
+    if (!isWanted) depth = null;
+    else if (depth?.frame !== shown) {
+      const wanted = { frame: shown };
+      depth = wanted;
+      depthOf(shown)
+        .then((content) => {
+          Object.assign(wanted, { content });
+          drawSoon();
+        })
+        .catch(page.message.problem);
+    }
+  }
+
   function showView(newView) {
     view = newView;
+    Object.assign(boxSize, { width: box.clientWidth, height: box.clientHeight });
     image.style.transform = `translate(${view.left}px, ${view.top}px) scale(${view.scale})`;
     image.classList.toggle("close", view.scale > CLOSE);
     setText(byId("zoom-fit-text"), zoom.isWhole() ? "Fit" : "Whole");
@@ -85,18 +108,27 @@ export function imagePart(page) {
     if (!drawMesh || !registration || canvas.hidden) return;
     const { T_camera_object: T } = registration;
     const unit = Math.min(devicePixelRatio, 2);
-    resize(canvas, Math.round(box.clientWidth * unit), Math.round(box.clientHeight * unit));
+    resize(canvas, Math.round(boxSize.width * unit), Math.round(boxSize.height * unit));
     const { scale, left, top } = view;
     const camera = shownCamera(shown.intrinsics, { scale: scale * unit, left: left * unit, top: top * unit });
-    drawMesh(canvas, { camera, T, color: colorOf(canvas), blend: blend.valueAsNumber, unit });
+    const { width, height } = canvas;
+    const look = { color: colorNow(), blend: blend.valueAsNumber, unit, depth: depth?.content };
+    drawMesh({ width, height, camera, T, ...look });
   }
 
   /** Draws the object where it is now, here and in the thumbnails. */
   function drawPose() {
     drawSoon();
     if (drawMesh && registration) {
-      strip.draw({ drawMesh, T_world_object: registration.T_world_object, color: colorOf(canvas) });
+      const { T_world_object, dragging } = registration;
+      strip.draw({ drawOn, T_world_object, color: colorNow(), dragging });
     }
+  }
+
+  /** Whose pose it is; asked of the style sheet once, since asking computes the styles of the page. */
+  function colorNow() {
+    const { source } = canvas.dataset;
+    return (colors[source] ??= rgb(getComputedStyle(canvas).color));
   }
 
   function fitOrWhole() {
@@ -124,20 +156,8 @@ export function imagePart(page) {
   return { bindings, open, draw };
 }
 
-/** Gives a canvas a size in pixels; only where it changes, since that wipes it. */
-function resize(canvas, width, height) {
-  if (canvas.width !== width) canvas.width = width;
-  if (canvas.height !== height) canvas.height = height;
-}
-
 /** The registration as if the object were where the operator looks before taking it. */
 function asLookedAt(registration, { T_world_camera }) {
   const { preview } = registration;
   return { ...registration, T_world_object: preview, T_camera_object: relativeTo(T_world_camera, preview) };
-}
-
-/** The colour of an element as [red, green, blue] from 0 to 1. */
-export function colorOf(node) {
-  const [red, green, blue] = getComputedStyle(node).color.match(/[\d.]+/g);
-  return [red / 255, green / 255, blue / 255];
 }

@@ -23,6 +23,7 @@ import { numbersPart } from "./numbers.js";
 import { drawPanel, isSnapping, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
+import { seeingPart } from "./seeing.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
 import { uncertaintyPart } from "./uncertainty.js";
@@ -56,6 +57,7 @@ const PARTS = [
   findPart(page),
   candidatesPart(page),
   uncertaintyPart(page),
+  seeingPart(page),
   viewsPart(page),
 ];
 

@@ -1,83 +1,18 @@
 /** Draws a mesh as a camera sees it, as an outline or as a shaded shape, by WebGL. */
 
+import { OUTLINE_FRAGMENT, SHAPE_FRAGMENT, SHAPE_VERTEX, WHOLE_VERTEX } from "./shaders.js";
+
 const NEAR = 0.01; // metres
 const FAR = 100;
 const SAMPLES = 4;
+const DEPTH_UNIT = 1; // of the textures; 0 is the shape
 const BLOCK = 16; // pixels: sizes are multiples, so that the levels of a mipmap average whole blocks
-
-const SHAPE_VERTEX = `#version 300 es
-uniform mat4 cameraFromObject;
-uniform mat4 projection;
-in vec3 position;
-out vec3 place;
-void main() {
-  vec4 inCamera = cameraFromObject * vec4(position, 1.0);
-  place = inCamera.xyz;
-  gl_Position = projection * inCamera;
-}`;
-
-// Red is how much light comes back to the camera from a flat face, alpha how much of the pixel is covered.
-const SHAPE_FRAGMENT = `#version 300 es
-precision highp float;
-in vec3 place;
-out vec4 painted;
-void main() {
-  vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
-  float light = 0.3 + 0.7 * abs(dot(normal, normalize(place)));
-  painted = vec4(light, 0.0, 0.0, 1.0);
-}`;
-
-const WHOLE_VERTEX = `#version 300 es
-void main() {
-  vec2 corner = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
-  gl_Position = vec4(corner, 0.0, 1.0);
-}`;
-
-// The line lies inside the edge of the shape, so that the edge itself is where colour meets dark: a dark rim on
-// either side lets it be read on any ground. Shrinking and growing the shape is a minimum and a maximum over
-// discs. Far from the edge nothing needs to be looked for: there the blocks of pixels around are all of one kind.
-const OUTLINE_FRAGMENT = `#version 300 es
-precision highp float;
-uniform sampler2D shape;
-uniform ivec2 size;
-uniform vec3 color;
-uniform float blend;
-uniform float unit;
-out vec4 painted;
-const float LINE = 2.5, RIM = 1.5;
-float cover(int x, int y, int level) {
-  ivec2 there = clamp(ivec2(gl_FragCoord.xy) + ivec2(x, y), ivec2(0), size - 1);
-  return texelFetch(shape, there >> level, level).a;
-}
-void main() {
-  vec4 seen = texelFetch(shape, ivec2(gl_FragCoord.xy), 0);
-  painted = blend * vec4(color * seen.r, seen.a);
-  int reach = int(ceil((LINE + RIM) * unit));
-  int level = reach > 4 ? 4 : 3;
-  float around = cover(-reach, -reach, level) + cover(reach, -reach, level) + cover(-reach, reach, level)
-    + cover(reach, reach, level);
-  if (around == 0.0 || around == 4.0) return;
-  float grown = seen.a, withoutLine = seen.a, withoutRim = seen.a;
-  for (int y = -reach; y <= reach; y++) {
-    for (int x = -reach; x <= reach; x++) {
-      float near = cover(x, y, 0);
-      float away = length(vec2(x, y)) - 0.5;
-      grown = max(grown, near * clamp(RIM * unit - away, 0.0, 1.0));
-      withoutLine = min(withoutLine, mix(1.0, near, clamp(LINE * unit - away, 0.0, 1.0)));
-      withoutRim = min(withoutRim, mix(1.0, near, clamp((LINE + RIM) * unit - away, 0.0, 1.0)));
-    }
-  }
-  float rim = 0.75 * (grown - seen.a) + 0.4 * (withoutLine - withoutRim);
-  float line = seen.a - withoutLine;
-  painted = painted * (1.0 - rim) + vec4(0.0, 0.0, 0.0, rim);
-  painted = painted * (1.0 - line) + vec4(color * line, line);
-}`;
 
 let shared = null;
 
-/** The mesh of the page's object and what draws it, {mesh, drawMesh}: one for all who show it. */
+/** The page's object, {mesh, drawOn}: its mesh, and what `meshCopying` makes of it; one for all who show it. */
 export function sharedDrawing(url) {
-  return (shared ??= loadMesh(url).then((mesh) => ({ mesh, drawMesh: meshDrawing(mesh) })));
+  return (shared ??= loadMesh(url).then((mesh) => ({ mesh, drawOn: meshCopying(mesh) })));
 }
 
 /** The mesh {vertices, faces} behind the `outline_mesh_url` of an object. */
@@ -115,35 +50,38 @@ export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
 }
 
 /**
- * What draws a mesh, or null where the browser has no WebGL 2.
+ * What draws a mesh on a canvas by WebGL, or null where the browser has no WebGL 2.
  *
- * The function returned paints over a canvas {camera, T, color, blend, unit}: the pinhole camera in pixels of
- * the canvas, T_camera_object in metres, the colour as [red, green, blue] from 0 to 1, `blend` from 0 (the
- * outline alone) to 1 (the shape hides what is below), and the pixels of the canvas in one of the page, up to 2. All
- * canvases share one hidden WebGL canvas, since a browser allows only a few.
+ * The function returned paints {width, height, camera, T, color, blend, unit, depth}: the canvas' lower left pixels
+ * that are painted, the pinhole camera in pixels of the canvas, T_camera_object in metres, the colour as [red, green,
+ * blue] from 0 to 1, `blend` from 0 (the outline alone) to 1 (the shape hides what is below), the pixels of the
+ * canvas in one of the page, up to 2, and the depth image of `loadDepth` with its `verdicts` (four colours: no data,
+ * match, in front, behind), where the shape is to show how depth agrees with it.
  */
-function meshDrawing({ vertices, faces }) {
-  const hidden = document.createElement("canvas");
-  const gl = hidden.getContext("webgl2", { antialias: false, depth: false });
+export function meshDrawing(canvas, { vertices, faces }) {
+  // What was drawn is kept, so that it can be copied and a page at rest draws nothing.
+  const gl = canvas.getContext("webgl2", { antialias: false, depth: false, preserveDrawingBuffer: true });
   if (!gl) return null;
   let programs = setUp(gl, vertices, faces);
   let buffers = null;
-  hidden.addEventListener("webglcontextlost", (event) => event.preventDefault());
-  hidden.addEventListener("webglcontextrestored", () => {
+  let depthThere = null;
+  canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
+  canvas.addEventListener("webglcontextrestored", () => {
     programs = setUp(gl, vertices, faces);
     buffers = null;
+    depthThere = null;
   });
 
   function makeRoom(width, height) {
-    if (buffers && hidden.width >= width && hidden.height >= height) return;
-    hidden.width = Math.max(hidden.width, BLOCK * Math.ceil(width / BLOCK));
-    hidden.height = Math.max(hidden.height, BLOCK * Math.ceil(height / BLOCK));
+    if (buffers && buffers.width >= width && buffers.height >= height) return;
     if (buffers) freeBuffers(gl, buffers);
-    buffers = makeBuffers(gl, hidden.width, hidden.height);
+    const [wide, high] = [width, height].map((size) => BLOCK * Math.ceil(size / BLOCK));
+    buffers = { width: wide, height: high, ...makeBuffers(gl, wide, high) };
   }
 
-  function drawShape({ camera, T }, width, height) {
+  function drawShape({ camera, T, depth, width, height }) {
     const { shape } = programs;
+    if (depth && depth !== depthThere) fillDepth(gl, (depthThere = depth));
     gl.bindFramebuffer(gl.FRAMEBUFFER, buffers.sampled);
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 0);
@@ -152,15 +90,18 @@ function meshDrawing({ vertices, faces }) {
     gl.useProgram(shape.program);
     gl.uniformMatrix4fv(shape.at("cameraFromObject"), false, columns(T));
     gl.uniformMatrix4fv(shape.at("projection"), false, columns(projection(camera, width, height)));
+    gl.uniform1i(shape.at("measured"), DEPTH_UNIT);
+    gl.uniform1f(shape.at("unitOfDepth"), depth?.metres ?? 0);
+    gl.uniform4fv(shape.at("sensor"), depth?.sensor ?? [1, 1, 0, 0]);
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, buffers.sampled);
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, buffers.resolved);
-    const all = [0, 0, hidden.width, hidden.height];
+    const all = [0, 0, buffers.width, buffers.height];
     gl.blitFramebuffer(...all, ...all, gl.COLOR_BUFFER_BIT, gl.NEAREST);
     gl.generateMipmap(gl.TEXTURE_2D);
   }
 
-  function drawOutline({ color, blend, unit }, width, height) {
+  function drawOutline({ color, blend, unit, depth, width, height }) {
     const { outline } = programs;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, width, height);
@@ -170,19 +111,58 @@ function meshDrawing({ vertices, faces }) {
     gl.uniform3fv(outline.at("color"), color);
     gl.uniform1f(outline.at("blend"), blend);
     gl.uniform1f(outline.at("unit"), unit);
+    gl.uniform1i(outline.at("isJudged"), depth ? 1 : 0);
+    if (depth) gl.uniform3fv(outline.at("verdicts"), depth.verdicts.flat());
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  return function draw(canvas, drawn) {
-    const { width, height } = canvas;
+  return function draw(drawn) {
     if (gl.isContextLost()) return;
-    makeRoom(width, height);
-    drawShape(drawn, width, height);
-    drawOutline(drawn, width, height);
+    makeRoom(drawn.width, drawn.height);
+    drawShape(drawn);
+    drawOutline(drawn);
+  };
+}
+
+/**
+ * What draws a mesh on many canvases, {camera, T, ...} each, by one hidden WebGL canvas, since a browser allows only a
+ * few; or null. Copying waits for all that WebGL still has to do: not for what follows the mouse.
+ */
+export function meshCopying(mesh) {
+  const hidden = document.createElement("canvas");
+  const draw = meshDrawing(hidden, mesh);
+  if (!draw) return null;
+  return function drawOn(canvas, drawn) {
+    const { width, height } = canvas;
+    resize(hidden, Math.max(hidden.width, width), Math.max(hidden.height, height));
+    draw({ width, height, ...drawn });
     const context = canvas.getContext("2d");
     context.clearRect(0, 0, width, height);
     context.drawImage(hidden, 0, hidden.height - height, width, height, 0, 0, width, height);
   };
+}
+
+/** Gives a canvas a size in pixels; only where it changes, since that wipes it. */
+export function resize(canvas, width, height) {
+  if (canvas.width !== width) canvas.width = width;
+  if (canvas.height !== height) canvas.height = height;
+}
+
+/** Puts a depth image where shaders read it. */
+function fillDepth(gl, { raw, width, height }) {
+  gl.activeTexture(gl.TEXTURE0 + DEPTH_UNIT);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.R16UI, width, height, 0, gl.RED_INTEGER, gl.UNSIGNED_SHORT, raw);
+  gl.activeTexture(gl.TEXTURE0);
+}
+
+/** Makes room for a depth image: one pixel without data. */
+function makeDepth(gl) {
+  gl.activeTexture(gl.TEXTURE0 + DEPTH_UNIT);
+  gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
+  fillDepth(gl, { raw: new Uint16Array(1), width: 1, height: 1 });
 }
 
 /** From camera axes (x right, y down, z forward) to WebGL's clip space, row by row. */
@@ -204,6 +184,7 @@ function columns(matrix) {
 function setUp(gl, vertices, faces) {
   const shape = link(gl, SHAPE_VERTEX, SHAPE_FRAGMENT);
   const outline = link(gl, WHOLE_VERTEX, OUTLINE_FRAGMENT);
+  makeDepth(gl);
   gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ARRAY_BUFFER, vertices, gl.STATIC_DRAW);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
@@ -229,7 +210,9 @@ function link(gl, vertex, fragment) {
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     throw new Error(`The outline cannot be drawn: ${gl.getProgramInfoLog(program)}`);
   }
-  return { program, at: (name) => gl.getUniformLocation(program, name) };
+  const places = new Map(); // asking WebGL each time would wait for it
+  const at = (name) => places.get(name) ?? places.set(name, gl.getUniformLocation(program, name)).get(name);
+  return { program, at };
 }
 
 /** A framebuffer with several samples a pixel, and one with a texture that they are averaged into. */

@@ -4,7 +4,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from app.outline_mesh import MOST_FACES, outline_mesh
+from app.outline_mesh import MOST_FACES, packed, thinned
 from registration_core import Intrinsics, ObjectModel, pose
 from registration_core.rasterizer import render_depth
 
@@ -26,7 +26,8 @@ def silhouette(model: ObjectModel) -> NDArray[np.bool_]:
 
 def test_a_small_mesh_is_kept_as_it_is() -> None:
     box = trimesh.creation.box((0.1, 0.2, 0.3))
-    kept = unpacked(outline_mesh(ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, np.int32))))
+    model = ObjectModel(np.asarray(box.vertices), np.asarray(box.faces, np.int32))
+    kept = unpacked(packed(thinned(model)))
     order = np.lexsort(kept.vertices.T)
     assert np.allclose(kept.vertices[order], box.vertices[np.lexsort(box.vertices.T)])
     assert len(kept.faces) == 12
@@ -36,9 +37,9 @@ def test_a_small_mesh_is_kept_as_it_is() -> None:
 def test_a_dense_mesh_is_thinned_and_keeps_its_silhouette() -> None:
     ring = trimesh.creation.torus(0.08, 0.03, major_sections=400, minor_sections=160)
     dense = ObjectModel(np.asarray(ring.vertices), np.asarray(ring.faces, np.int32))
-    thinned = unpacked(outline_mesh(dense))
+    coarse = unpacked(packed(thinned(dense)))
     assert len(dense.faces) > 2 * MOST_FACES
-    assert MOST_FACES / 2 < len(thinned.faces) <= MOST_FACES
-    one, other = silhouette(dense), silhouette(thinned)
+    assert MOST_FACES / 2 < len(coarse.faces) <= MOST_FACES
+    one, other = silhouette(dense), silhouette(coarse)
     assert one.sum() > 5000
     assert (one & other).sum() / (one | other).sum() > 0.99

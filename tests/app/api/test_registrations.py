@@ -43,6 +43,27 @@ def registration(script: httpx.Client) -> dict[str, Any]:
     return begin(script)
 
 
+# -- what is seen
+
+
+def test_the_state_says_how_depth_agrees(script: httpx.Client, registration: dict[str, Any]) -> None:
+    right = put_pose(script, registration, true_pose(TOOL)).json()["agreement"]
+    assert right["inlier_share"] > 0.9
+    assert right["median_residual"] < 0.002
+    assert right["match"] + right["in_front"] + right["behind"] + right["no_data"] == pytest.approx(1.0)
+    wrong = put_pose(script, registration, true_pose(TOOL) @ pose.exp([0.02, 0, 0, 0, 0, 0.3])).json()
+    assert wrong["agreement"]["inlier_share"] < right["inlier_share"] - 0.2
+    assert put_pose(script, registration, pose.exp([9.0, 9.0, 0, 0, 0, 0])).json()["agreement"] is None
+
+
+def test_layers_are_chosen(script: httpx.Client, registration: dict[str, Any]) -> None:
+    assert registration["layers"] == {"cloud": True, "mesh": True, "agreement": False}
+    url = f"{url_of(registration)}/layers"
+    chosen = {"cloud": False, "mesh": True, "agreement": True}
+    assert script.put(url, json=chosen).json()["layers"] == chosen
+    assert "cloud" in sentence(script.put(url, json={"cloud": "maybe"}), 422)
+
+
 # -- a whole registration
 
 

@@ -54,6 +54,17 @@ def test_depth_is_16_bit_and_in_millimetres_when_scaled(scenes: list[dict], oper
     assert 300 < np.median(raw[raw > 0]) * frame["depth_scale"] < 1000
 
 
+def test_raw_depth_is_the_picture_for_those_who_cannot_read_16_bit(
+    scenes: list[dict], operator: httpx.Client
+) -> None:
+    frame = scenes[0]["frames"][0]
+    answer = operator.get(frame["raw_depth_url"])
+    assert "private" in answer.headers["cache-control"]
+    with Image.open(io.BytesIO(operator.get(frame["depth_url"]).content)) as image:
+        raw = np.frombuffer(answer.content, "<u2").reshape(frame["height"], frame["width"])
+        assert np.array_equal(raw, np.asarray(image))
+
+
 def test_a_jpeg_comes_as_png_and_a_missing_picture_is_said(
     server: LiveServer, operator: httpx.Client, demo_copy: Path
 ) -> None:

@@ -9,6 +9,7 @@ import pytest
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import History, Step
+from app.labeling.layers import Layers
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
@@ -236,6 +237,15 @@ def test_a_drag_along_the_worlds_axes_is_recorded_as_such(bench):
     with pytest.raises(ActionError, match="being dragged"):
         bench.session.align_gizmo("object")
     assert bench.state.gizmo_axes == "world"
+
+
+def test_what_the_view_shows_is_chosen_at_any_time_and_is_no_event(bench):
+    chosen = Layers(cloud=False, agreement=True)
+    bench.session.start_drag()
+    bench.session.show_layers(chosen)
+    assert bench.state.layers == chosen
+    assert bench.state.dragging
+    assert bench.log.events == []
 
 
 def test_a_move_starts_from_the_present_pose_and_says_how(bench):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from app.labeling.layers import Layers
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from registration_core import ObjectModel, pose
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
@@ -99,6 +100,32 @@ def test_the_cloud_arrives_in_full_precision_and_is_replaced(view):
         assert cloud["point_size"] == pytest.approx(0.002)
         view.show_cloud(POINTS[:1], COLORS[:1], point_size=0.001)
         client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
+
+
+def test_cloud_and_mesh_are_put_away_and_the_gizmo_stays(view):
+    view.show_cloud(POINTS, COLORS, point_size=0.002)
+    with connect(view) as client:
+        view.show_layers(Layers(cloud=False, mesh=False))
+        for name in ("/cloud", "/object/mesh"):
+            client.wait_for(
+                "SetSceneNodeVisibilityMessage", lambda m, name=name: m["name"] == name and not m["visible"]
+            )
+        view.show_cloud(POINTS[:1], COLORS[:1], point_size=0.001)  # of another frame
+        client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
+    with connect(view) as again:
+        again.wait_for("SetSceneNodeVisibilityMessage", lambda m: m["name"] == "/cloud" and not m["visible"])
+        again.node("TransformControlsMessage", "/object")
+
+
+def test_points_on_the_object_hang_on_its_mesh_and_are_replaced(view, model):
+    with connect(view) as client:
+        on_object = model.vertices[:3]
+        view.show_on_object(on_object, COLORS)
+        cloud = client.node("PointCloudMessage", "/object/mesh/surface")["props"]
+        expected = 1.03 * (on_object - model.centre)
+        assert cloud["points"].reshape(-1, 3) == pytest.approx(expected, abs=2e-4)
+        view.show_on_object(on_object[:1], COLORS[:1])
+        client.wait_for("SceneNodeUpdateMessage", lambda m: m["updates"].get("points", POINTS).size == 3)
 
 
 def visible(client: ViserClient, shown: bool) -> None:

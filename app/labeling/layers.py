@@ -1,0 +1,13 @@
+"""What the 3-D view shows of a scene besides the gizmo, which is always there."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Each can be put away, so that what it hides is seen."""
+
+    cloud: bool = True
+    mesh: bool = True
+    agreement: bool = False
+    """The object's surface, coloured by how the depth image agrees with it."""

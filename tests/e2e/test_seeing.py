@@ -1,0 +1,134 @@
+"""Seeing whether a pose is right: depth agreement as colours and numbers, what can be put away, and how often
+the outline is redrawn in a drag.
+"""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, expect
+
+from registration_core import pose
+from tests.app.waiting import LONGEST, wait_until
+from tests.e2e.conftest import take_picture
+from tests.e2e.gizmo import Handle, pixel
+from tests.e2e.test_image import Image
+from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.test_readme import true_pose
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+COUNT_REDRAWS = """if (window === top) {
+  window.redraws = 0;
+  const original = WebGL2RenderingContext.prototype.drawArrays;
+  WebGL2RenderingContext.prototype.drawArrays = function (...rest) {
+    window.redraws += this.canvas.id === "outline";
+    return original.apply(this, rest);
+  };
+}"""
+DRAG_SECONDS = 4.0
+IS_DRAWN = "name => window.__viserMutable.nodeRefFromName[name]?.visible"
+IS_HIDDEN = "name => window.__viserMutable.nodeRefFromName[name]?.visible === false"
+NEARER = pose.exp([0.0, 0.0, -0.15, 0.0, 0.0, 0.0])
+FARTHER = pose.exp([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+
+
+@pytest.fixture(scope="module")
+def image(server: Server, browser: Browser) -> Iterator[Image]:
+    """The page of an operator before the mug of the first demo scene."""
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
+    context.add_init_script(COUNT_REDRAWS)
+    problems: list[str] = []
+    page = context.new_page()
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.goto(server.new_link("operator who looks"))
+    yield Image(Desk(page, server, "mug"))
+    context.close()
+    assert problems == []
+
+
+def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
+    desk, page = image.desk, image.page
+    handle = Handle("tz", desk.scale)
+    start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
+    page.mouse.move(*(start - 2))
+    page.mouse.move(*start)
+    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    page.mouse.down()
+    wait_until(lambda: desk.state["dragging"], "the drag")
+    before, began = page.evaluate("redraws"), time.monotonic()
+    moves = redraws = 0
+    passed = 0.0
+    while passed < DRAG_SECONDS or (redraws < 5 and passed < LONGEST):  # however busy the machine is
+        page.mouse.move(*(start + (end - start) * abs(np.sin(passed))))
+        moves, passed = moves + 1, time.monotonic() - began
+        redraws = page.evaluate("redraws") - before
+    assert desk.state["dragging"]
+    page.mouse.up()
+    print(f"{moves / passed:.1f} moves and {redraws / passed:.1f} redraws of the outline a second")
+    assert redraws >= 5
+
+
+def dominant(image: Image) -> str:
+    """The verdict whose colour most of the object has on the image."""
+    colors = {"match": (38, 173, 140), "in_front": (255, 233, 72), "behind": (151, 84, 255)}
+    pixels = image.pixels
+    inside = pixels[pixels[..., 3] == 217][:, :3].astype(
+        float
+    )  # 85 % opaque: no outline, no rim, no lack of data
+    if len(inside) < 50:
+        return ""
+    shade = np.linalg.norm(np.median(inside, axis=0))
+    unit = {name: np.array(rgb) / np.linalg.norm(rgb) for name, rgb in colors.items()}
+    seen = np.median(inside, axis=0) / max(shade, 1.0)
+    return max(unit, key=lambda name: float(unit[name] @ seen))
+
+
+def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
+    desk, page = image.desk, image.page
+    T_world_camera = np.array(image.frames[0]["T_world_camera"])
+    truth = pose.inverse(T_world_camera) @ true_pose(desk.task["object"]["obj_id"])
+    image.put(truth)
+    share = page.locator("#agreement-share")
+    expect(share).to_have_text(f"{100 * desk.state['agreement']['inlier_share']:.0f} %")
+    assert desk.state["agreement"]["inlier_share"] > 0.9
+    assert desk.state["agreement"]["median_residual"] < 0.002
+    expect(page.locator("#verdicts")).to_be_hidden()
+    page.keyboard.press("r")
+    expect(page.locator("#verdicts")).to_be_visible()
+    page.keyboard.press("z")
+    for T, verdict in ((truth, "match"), (NEARER @ truth, "in_front"), (FARTHER @ truth, "behind")):
+        image.put(T)
+        wait_until(lambda verdict=verdict: dominant(image) == verdict, f"the colour of {verdict}", 40)
+        shown = desk.state["agreement"][verdict]
+        row = page.locator(f"[data-verdict={verdict}] output")
+        expect(row).to_have_text(f"{100 * shown:.0f} %")
+        assert shown > 0.7
+        desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
+        desk.frame.evaluate(NEXT_PICTURE)
+        page.emulate_media(color_scheme="dark" if verdict == "behind" else "light")
+        take_picture(page, f"label-agreement-{verdict}")
+    page.get_by_role("button", name="Agreement").click()
+    expect(page.locator("#verdicts")).to_be_hidden()
+    wait_until(lambda: dominant(image) == "", "the outline alone")
+
+
+def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
+    desk, page = image.desk, image.page
+    assert page.request.post(f"{desk.url}/reset").ok
+    page.keyboard.press("b")
+    desk.frame.wait_for_function(IS_HIDDEN, arg="/cloud")
+    page.get_by_role("button", name="Mesh").click()
+    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/mesh")
+    expect(page.get_by_role("button", name="Cloud")).to_have_attribute("aria-pressed", "false")
+    assert desk.drag("tz", 0.05)["dof"] == ["tz"]  # the gizmo stays
+    take_picture(page, "label-layers-hidden")
+    assert page.request.put(f"{desk.url}/layers", data={}).ok  # as after the server was restarted
+    wait_until(
+        lambda: desk.state["layers"] == {"cloud": False, "mesh": False, "agreement": False}, "what was chosen"
+    )
+    page.keyboard.press("m")
+    page.keyboard.press("b")
+    wait_until(lambda: desk.state["layers"]["mesh"], "the mesh")
