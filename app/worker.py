@@ -75,18 +75,18 @@ def run_snap(job: SnapJob, model: ObjectModel | None, cache_dir: Path | None = N
     known = model or _models.get(job.model_hash)
     if known is None:
         return None
+    _report(job, 0.0)
+    reported = time.monotonic()
     prepare(known, cache_dir)
-    reported = 0.0
     estimate = None
     rng = np.random.default_rng(job.seed)
     steps = snap_steps(known, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread)
     for step in steps:
         if job.snap_id in _cancelled:
             raise SnapCancelledError(job.snap_id)
-        if job.topic and time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
+        if time.monotonic() - reported > SECONDS_BETWEEN_REPORTS:
             reported = time.monotonic()
-            share = step.iteration / max(1, step.iterations)
-            get_worker().log_event(job.topic, {"snap_id": job.snap_id, "progress": share})
+            _report(job, step.iteration / max(1, step.iterations))
         estimate = step.estimate
     assert estimate is not None
     return JobResult(estimate, _hardware())
@@ -108,6 +108,11 @@ def dask_setup(dask_worker: Any) -> None:
     if dask_worker.nanny:  # which ends this process in order when someone presses Ctrl-C
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm_up()
+
+
+def _report(job: SnapJob, share: float) -> None:
+    if job.topic:
+        get_worker().log_event(job.topic, {"snap_id": job.snap_id, "progress": share})
 
 
 def _keep(model: ObjectModel) -> None:
