@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 @dataclass
 class BreakableWay:
-    """Passes bytes on; what it carries can be cut by the first line of its request."""
+    """Passes bytes on; what it carries can be cut, and refused, by the head of its first request."""
 
     port: int
     """Of the server."""
     listener: socket.socket = field(default_factory=lambda: socket.create_server(("127.0.0.1", 0)))
     open: list[tuple[bytes, socket.socket, socket.socket]] = field(default_factory=list)
     refused: bytes | None = None
-    """Part of the first line of requests that find no way."""
+    """Part of the heads of requests that find no way."""
 
     @property
     def url(self) -> str:
@@ -24,7 +24,7 @@ class BreakableWay:
         return f"http://127.0.0.1:{self.listener.getsockname()[1]}"
 
     def cut(self, part: bytes) -> int:
-        """Close what carries a request with this in its first line; returns how many."""
+        """Close what carries a request with this in its head; returns how many."""
         hit = [way for way in self.open if part in way[0]]
         for _, one, other in hit:
             _shut(one)
@@ -41,12 +41,12 @@ class BreakableWay:
     def _carry(self, page: socket.socket) -> None:
         with contextlib.suppress(OSError):
             first = page.recv(65536)
-            line = first.split(b"\r\n", 1)[0]
-            if not first or (self.refused is not None and self.refused in line):
+            head = first.split(b"\r\n\r\n", 1)[0].lower()
+            if not first or (self.refused is not None and self.refused in head):
                 page.close()
                 return
             server = socket.create_connection(("127.0.0.1", self.port))
-            self.open.append((line, page, server))
+            self.open.append((head, page, server))
             server.sendall(first)
             threading.Thread(target=_pass_on, args=(server, page), daemon=True).start()
             _pass_on(page, server)

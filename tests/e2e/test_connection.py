@@ -10,16 +10,16 @@ from playwright.sync_api import Page, expect
 from app.labeling.session import BROKEN_DRAG
 from tests.e2e.breakable import BreakableWay, breakable_way
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, expect_new_view, pixel, view_frame
+from tests.e2e.gizmo import expect_new_view, view_frame
 from tests.e2e.test_labelling import Desk
+from tests.e2e.test_machine import hold
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
 SLOWEST = 60_000
-VIEW = b"GET /view/"
-SOCKET = b"/ HTTP"
-"""The view's WebSocket asks for its folder, not for a file."""
+VIEW = b"upgrade: websocket"
+"""Only the 3-D view has one."""
 
 
 @pytest.fixture
@@ -34,29 +34,13 @@ def desk(way: BreakableWay, server: Server, open_page: Callable[[str], Page], re
     return Desk(open_page(behind.new_link(request.node.name.replace("_", "-")[:60])), behind)
 
 
-def cut_view(way: BreakableWay) -> None:
-    assert sum(way.cut(line) for line, *_ in list(way.open) if line.startswith(VIEW) and SOCKET in line)
-
-
-def hold(desk: Desk, handle: str, amount: float) -> None:
-    """Drag a handle and keep the button down."""
-    grip = Handle(handle, desk.scale)
-    start, end = (pixel(desk.page, desk.frame, at) for at in (grip.grip, grip.moved_grip(amount)))
-    desk.page.mouse.move(*(start - 2))
-    desk.page.mouse.move(*start)
-    desk.page.wait_for_timeout(100)
-    desk.page.mouse.down()
-    for share in np.linspace(0.2, 1, 5):
-        desk.page.mouse.move(*(start + share * (end - start)))
-
-
 def test_a_view_that_lost_its_connection_gets_another(desk: Desk, way: BreakableWay) -> None:
     page = desk.page
     kept = desk.drag("tx", 0.02)["T_after"]
     page.locator("#undo").focus()  # away from the view, which reconnects only while it has the focus
     expect_new_view(desk.frame)
     way.refused = VIEW
-    cut_view(way)
+    assert way.cut(VIEW)
     expect(page.locator("#view-lost")).to_be_visible(timeout=SLOWEST)
     expect(page.locator("#connection")).to_be_hidden()
     take_picture(page, "label-view-lost")

@@ -14,6 +14,7 @@ SLOWEST = 60_000
 
 def test_a_new_operator_is_shown_around_once(server: Server, browser: Browser) -> None:
     context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
+    context.set_default_timeout(SLOWEST)
     page = context.new_page()
     page.goto(server.new_link("newcomer"))
     desk = Desk(page, server)

@@ -19,15 +19,8 @@ SLOWEST = 90_000
 @pytest.fixture
 def cluster() -> Iterator[LocalCluster]:
     """A scheduler without workers."""
-    with LocalCluster(
-        n_workers=0,
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-        worker_dashboard_address="127.0.0.1:0",
-        memory_limit=0,
-        preload=["app.worker"],
-    ) as started:
+    here = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0"}
+    with LocalCluster(n_workers=0, threads_per_worker=1, **here) as started:
         yield started
 
 
