@@ -90,6 +90,18 @@ class Auth:
             session.flush()
             return user
 
+    def user(self, name: str) -> User:
+        """The user of this name.
+
+        Raises:
+            ValueError: where there is none.
+        """
+        with self._database.read() as session:
+            user = _find_user(session, name)
+        if user is None:
+            raise ValueError(f"there is no user {name!r}")
+        return user
+
     def ensure_user(self, name: str, role: Role) -> User:
         """The user of this name, made where there is none.
 

@@ -164,6 +164,19 @@ def add_user(
     console.print(sign_in_link(settings, settings.port, auth.create_link(user.id)))
 
 
+@user_cli.command("link")
+def link_user(name: str) -> None:
+    """Print a one-time link for a person who is there already."""
+    from app.auth import Auth
+    from app.server import sign_in_link
+
+    settings = _settings()
+    auth = Auth(_checked_database(settings))
+    link = sign_in_link(settings, settings.port, auth.create_link(auth.user(name).id))
+    console.print(f"User {name} may sign in, once, with this link:")
+    console.print(link)
+
+
 def _settings(**given: object) -> "Settings":
     from pydantic import ValidationError
 

@@ -2,10 +2,11 @@
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as PlannedCall
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -39,9 +40,25 @@ class _Pending:
     on_progress: Callable[[float], None]
     on_end: Callable[[Any], None]
     priority: int
+    since: float = field(default_factory=time.monotonic)
+    """When it was asked for or, once a worker is at it, when that began."""
+    running: bool = False
+    """A worker is at it."""
     future: Future | None = None
     begun: bool = False
     """A worker has told that it is at it, or was given the job for the second time."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a snap stands that has brought no result yet."""
+
+    workers: int
+    """How many are there now."""
+    ahead: int
+    """How many snaps go before it; 0 once it runs."""
+    seconds: float
+    """How long it has waited or, once a worker is at it, has run."""
 
 
 class Snapper:
@@ -75,6 +92,21 @@ class Snapper:
         if not self._client.done() or self._client.exception() is not None:
             return 0
         return len(self._client.result().scheduler_info(n_workers=-1)["workers"])
+
+    def waiting_count(self) -> int:
+        """How many snaps wait for a worker now; live ones, which nobody waits for, do not count."""
+        with self._lock:
+            return sum(pending.priority >= 0 and not pending.running for pending in self._pending.values())
+
+    def standing(self, snap_id: str) -> Standing | None:
+        """How a snap stands; None where it has ended."""
+        workers = self.worker_count()
+        with self._lock:
+            mine = self._pending.get(snap_id)
+            if mine is None:
+                return None
+            ahead = 0 if mine.running else sum(_goes_before(one, mine) for one in self._pending.values())
+        return Standing(workers, ahead, time.monotonic() - mine.since)
 
     def request(
         self,
@@ -185,6 +217,8 @@ class Snapper:
         pending = self._find(report["snap_id"])
         if pending is not None:
             pending.begun = True
+            if not pending.running:
+                pending.running, pending.since = True, time.monotonic()
             pending.on_progress(report["progress"])
 
     def _find(self, snap_id: str) -> _Pending | None:
@@ -223,6 +257,11 @@ class Snapper:
 def create_snapper(settings: Settings) -> Snapper:
     """Start, or reach for, the workers that the settings ask for."""
     return Snapper(settings.scheduler_address, settings.workers, settings.cache_dir.resolve())
+
+
+def _goes_before(one: _Pending, other: _Pending) -> bool:
+    """Whether one waits for a worker as the other does, and is to get one earlier."""
+    return not one.running and (-one.priority, one.since) < (-other.priority, other.since)
 
 
 def _log_failure(future: Future) -> None:

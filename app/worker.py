@@ -146,8 +146,10 @@ def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None 
     known = model or _models.get(job.model_hash)
     if known is None:
         return None
+    tell = _teller(job.snap_id, job.topic)
+    tell(0.0)
     prepare(known, cache_dir)
-    return job.run(known, _teller(job.snap_id, job.topic))
+    return job.run(known, tell)
 
 
 def prepare(model: ObjectModel, cache_dir: Path | None) -> None:
@@ -169,7 +171,7 @@ def dask_setup(dask_worker: Any) -> None:
 
 
 def _teller(snap_id: str, topic: str) -> Tell:
-    reported = 0.0
+    reported = float("-inf")
 
     def tell(share: float) -> None:
         nonlocal reported

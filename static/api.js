@@ -1,5 +1,8 @@
 /** The server's REST interface: JSON in and out, problems as errors, sign-in when the login has ended. */
 
+const UNAUTHORIZED = 401;
+let signInAgain = goToSignIn;
+
 /** A call that did not succeed; `message` is one sentence for people. `status` is 0 without an answer. */
 export class ApiError extends Error {
   constructor(status, message) {
@@ -38,6 +41,16 @@ export async function nextTask() {
   }
 }
 
+/** Who is signed in, or null; nobody is asked to sign in for this. */
+export async function whoIsSignedIn() {
+  try {
+    return await requestOnce("GET", "/api/me");
+  } catch (error) {
+    if (error.status === UNAUTHORIZED) return null;
+    throw error;
+  }
+}
+
 /** The sentence to show for a failed answer with the given body text. */
 export function problemSentence(status, text) {
   try {
@@ -50,9 +63,18 @@ export function problemSentence(status, text) {
   return `The server answered with error ${status}. Nothing was changed.`;
 }
 
-/** Goes to the sign-in page, which comes back here afterwards. */
+/**
+ * Lets `ask` sign somebody in where the login has ended, in place of the sign-in page. What was asked of the
+ * server meanwhile is asked again once the promise of `ask` is fulfilled.
+ */
+export function onSignedOut(ask) {
+  signInAgain = ask;
+}
+
+/** Goes to the sign-in page, which comes back here afterwards; nothing that waits for it runs. */
 export function goToSignIn() {
   location.assign(`/sign-in?next=${encodeURIComponent(location.pathname + location.search)}`);
+  return new Promise(() => {});
 }
 
 function withQuery(path, params = {}) {
@@ -62,6 +84,16 @@ function withQuery(path, params = {}) {
 }
 
 async function request(method, path, body) {
+  try {
+    return await requestOnce(method, path, body);
+  } catch (error) {
+    if (error.status !== UNAUTHORIZED || path.startsWith("/api/sign-in")) throw error;
+    await signInAgain();
+    return request(method, path, body);
+  }
+}
+
+async function requestOnce(method, path, body) {
   const options = { method, headers: { Accept: "application/json" } };
   if (body !== undefined) {
     options.headers["Content-Type"] = "application/json";
@@ -72,10 +104,6 @@ async function request(method, path, body) {
     answer = await fetch(path, options);
   } catch {
     throw new ApiError(0, UNREACHABLE);
-  }
-  if (answer.status === 401 && location.pathname !== "/sign-in") {
-    goToSignIn();
-    return new Promise(() => {}); // The page is about to go: let nothing after this call run.
   }
   const text = await answer.text();
   if (!answer.ok) throw new ApiError(answer.status, problemSentence(answer.status, text));

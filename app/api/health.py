@@ -23,6 +23,8 @@ class Health(BaseModel):
     version: str
     database: bool
     workers: int
+    waiting: int
+    """Snaps that wait for a worker."""
 
 
 def current_health(services: Annotated[Services, Depends(get_services)]) -> Health:
@@ -36,7 +38,13 @@ def current_health(services: Annotated[Services, Depends(get_services)]) -> Heal
     workers = services.snapper.worker_count()
     missing = [name for name, there in (("database", database), ("workers", workers > 0)) if not there]
     status = f"waiting for {' and '.join(missing)}" if missing else "ready"
-    return Health(status=status, version=__version__, database=database, workers=workers)
+    return Health(
+        status=status,
+        version=__version__,
+        database=database,
+        workers=workers,
+        waiting=services.snapper.waiting_count(),
+    )
 
 
 @router.get("/health", response_model=Health, responses={503: {"model": Health}})

@@ -7,12 +7,22 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Depends, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from pydantic import BaseModel, Field
 from sqlalchemy import select
 
-from app.api.dependencies import AfterDep, Id, IdentityDep, LimitDep, Page, ServicesDep, page_of, rigid_pose
+from app.api.dependencies import (
+    AfterDep,
+    Id,
+    IdentityDep,
+    LimitDep,
+    Page,
+    ServicesDep,
+    identify,
+    page_of,
+    rigid_pose,
+)
 from app.auth import Actor
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat
@@ -26,6 +36,9 @@ router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
 SECONDS_BETWEEN_UPDATES = 0.05
 """A stream tells no more often than that, and always tells the last state."""
+
+SECONDS_BETWEEN_SIGNS_OF_LIFE = 10.0
+"""A stream tells no less often than that."""
 
 Technique = Literal[
     "nudge", "turn", "flip", "numbers", "rest", "place", "three points", "proposal", "mode", "copy"
@@ -115,6 +128,8 @@ class RegistrationOut(BaseModel):
     preview: Pose | None = Field(description="T_world_object that is looked at before it is taken.")
     message: str | None
     view_url: str
+    view_open: bool
+    """Whether a page is connected to the 3-D view."""
 
 
 class NewPose(BaseModel):
@@ -253,9 +268,12 @@ def list_events(
 
 @router.get("/{registration_id}/stream", response_class=EventSourceResponse)
 async def stream(
-    seat: SeatDep, services: ServicesDep, page: PageName = None
+    request: Request, seat: SeatDep, services: ServicesDep, page: PageName = None
 ) -> AsyncIterator[ServerSentEvent]:
-    """Server-sent events: the registration at once, and again whenever it changes.
+    """Server-sent events: the registration at once, again whenever it changes, and every ten seconds.
+
+    So a page that hears nothing for longer knows that it has lost the connection. When the login ends, so
+    does the stream.
 
     With the name of a page, another page's stream of this registration ends with the event `taken_over`.
     """
@@ -283,12 +301,21 @@ async def stream(
             out = await asyncio.to_thread(registration_out, seat)
             yield ServerSentEvent(event="registration", data=out)
             await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
-            await changed.wait()
+            if not await _in_time(changed) and await asyncio.to_thread(identify, request) is None:
+                return
     finally:
         if stand_up:
             stand_up()
         unsubscribe()
         leave()
+
+
+async def _in_time(changed: asyncio.Event) -> bool:
+    try:
+        await asyncio.wait_for(changed.wait(), SECONDS_BETWEEN_SIGNS_OF_LIFE)
+    except TimeoutError:
+        return False
+    return True
 
 
 def registration_out(seat: Seat) -> RegistrationOut:
@@ -321,6 +348,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         preview=None if state.preview is None else state.preview.tolist(),
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
+        view_open=seat.viewers > 0,
     )
 
 

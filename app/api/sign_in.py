@@ -6,10 +6,12 @@ from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Cookie, HTTPException, Request, Response
 from pydantic import BaseModel, Field
+from sqlalchemy import func, select
 
 from app.api.dependencies import SESSION_COOKIE, IdentityDep, ServicesDep, is_same_origin
 from app.auth import LOGIN_LIFETIME
 from app.services import Services
+from app.tables import Registration
 
 router = APIRouter(prefix="/api", tags=["sign-in"])
 
@@ -33,6 +35,8 @@ class Me(BaseModel):
     id: int
     name: str
     role: str
+    submitted: int
+    """How many registrations they have submitted."""
 
 
 @router.post("/sign-in", status_code=204)
@@ -63,9 +67,12 @@ def sign_out(
 
 
 @router.get("/me")
-def me(identity: IdentityDep) -> Me:
+def me(identity: IdentityDep, services: ServicesDep) -> Me:
     """Who is signed in."""
-    return Me(id=identity.user_id, name=identity.name, role=identity.role)
+    mine = select(func.count(Registration.id)).filter_by(user_id=identity.user_id, state="submitted")
+    with services.database.read() as session:
+        submitted = session.scalar(mine) or 0
+    return Me(id=identity.user_id, name=identity.name, role=identity.role, submitted=submitted)
 
 
 def _refuse_foreign_page(request: Request) -> None:

@@ -1,5 +1,6 @@
 """Snaps: asking for one, how it stands, and cancelling it."""
 
+from dataclasses import asdict
 from math import pi
 from typing import Annotated, Any, Literal, cast
 
@@ -101,6 +102,14 @@ class EstimateOut(BaseModel):
     evaluations: int
 
 
+class StandingOut(BaseModel):
+    """How a snap stands with the workers."""
+
+    workers: int = Field(description="How many are there now.")
+    ahead: int = Field(description="How many snaps go before it.")
+    seconds: float = Field(description="How long it has waited or, once it runs, has run.")
+
+
 class SnapDetail(BaseModel):
     """How a snap stands."""
 
@@ -109,6 +118,8 @@ class SnapDetail(BaseModel):
     state: SnapState
     progress: float
     message: str | None
+    standing: StandingOut | None
+    """While it waits or runs."""
     estimate: EstimateOut | None
 
 
@@ -139,11 +150,13 @@ def get_snap(snap_id: str, services: ServicesDep, identity: IdentityDep) -> Snap
             state=OUTCOMES[outcome.kind],
             progress=1.0 if estimate else 0.0,
             message=outcome.detail.get("message"),
+            standing=None,
             estimate=_estimate_out(estimate) if estimate else None,
         )
     if live is not None and live.id == snap_id:
         state = cast(SnapState, live.state)  # "failed" where the outcome could not be saved
-        return _without_outcome(snap_id, registration_id, state, live.progress, live.message)
+        standing = _standing(services, snap_id)
+        return _without_outcome(snap_id, registration_id, state, live.progress, live.message, standing)
     return _without_outcome(snap_id, registration_id, "failed", 0.0, INTERRUPTED)
 
 
@@ -167,7 +180,12 @@ def _events(services: Services, identity: Identity, snap_id: str) -> list[Event]
 
 
 def _without_outcome(
-    snap_id: str, registration_id: int, state: SnapState, progress: float, message: str | None
+    snap_id: str,
+    registration_id: int,
+    state: SnapState,
+    progress: float,
+    message: str | None,
+    standing: StandingOut | None = None,
 ) -> SnapDetail:
     return SnapDetail(
         id=snap_id,
@@ -175,8 +193,14 @@ def _without_outcome(
         state=state,
         progress=progress,
         message=message,
+        standing=standing,
         estimate=None,
     )
+
+
+def _standing(services: Services, snap_id: str) -> StandingOut | None:
+    standing = services.snapper.standing(snap_id)
+    return None if standing is None else StandingOut(**asdict(standing))
 
 
 def _estimate_out(row: EstimateRow) -> EstimateOut:

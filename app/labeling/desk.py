@@ -65,6 +65,8 @@ class Seat:
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
+    viewers: int = 0
+    """Open connections of the 3-D view."""
     chair: Chair = field(default_factory=Chair)
     lock: threading.Lock = field(default_factory=threading.Lock)
 

@@ -50,7 +50,7 @@ async def view_socket(socket: WebSocket, registration_id: Id) -> None:
     port = await asyncio.to_thread(services.desk.view_port, seat)
     leave = services.desk.watch(seat)
     try:
-        await _join(socket, port)
+        await _join(socket, port, seat)
     finally:
         leave()
 
@@ -67,7 +67,7 @@ def _allowed_seat(socket: WebSocket, registration_id: int) -> Seat | None:
         return None
 
 
-async def _join(socket: WebSocket, port: int) -> None:
+async def _join(socket: WebSocket, port: int, seat: Seat) -> None:
     protocols = [
         websockets.Subprotocol(name)
         for name in socket.scope["subprotocols"]
@@ -77,13 +77,23 @@ async def _join(socket: WebSocket, port: int) -> None:
         f"ws://127.0.0.1:{port}/", subprotocols=protocols, max_size=None, compression=None
     ) as view:
         await socket.accept(subprotocol=view.subprotocol)
+        await _count(seat, +1)
         tasks = {asyncio.create_task(_to_page(socket, view)), asyncio.create_task(_to_view(socket, view))}
-        _, unfinished = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        try:
+            _, unfinished = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            await _count(seat, -1)
         for task in unfinished:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the page may have closed first
             await socket.close()
+
+
+async def _count(seat: Seat, change: int) -> None:
+    """The page learns from its stream that its 3-D view came or went: a view cannot tell that itself."""
+    seat.viewers += change
+    await asyncio.to_thread(seat.session.tell)
 
 
 async def _to_page(socket: WebSocket, view: websockets.ClientConnection) -> None:

@@ -40,6 +40,8 @@ from registration_core import SnapConfig
 Array = NDArray[np.float64]
 P = ParamSpec("P")
 
+BROKEN_DRAG = "The connection broke in mid-drag: the object is where it had come to. Undo takes it back."
+
 
 @dataclass(frozen=True)
 class SessionState:
@@ -189,14 +191,18 @@ class LabelingSession:
             self._track.drag.move(T_world_object)
             self._changed()
 
-    def end_drag(self) -> None:
+    def end_drag(self, broken: bool = False) -> None:
         """The operator let go: the drag is written down; where that fails, it is taken back and said so.
 
-        In `auto` the machine has its turn then.
+        In `auto` the machine has its turn then. A drag that was `broken`, by a lost connection, is kept as
+        far as it came, which is said, and is no sign to the machine.
         """
         with self._lock:
             try:
-                if self._write_drag():
+                moved = self._write_drag()
+                if moved and broken:
+                    self._track.message = BROKEN_DRAG
+                elif moved:
                     self._machine.take_turn()
             finally:
                 self._changed()
@@ -418,6 +424,11 @@ class LabelingSession:
             self._machine.close()
             self._search.abandon(Actor.MACHINE, "session closed")
             self._listeners.clear()
+
+    def tell(self) -> None:
+        """Tell the listeners the state once more: something beside it has changed."""
+        with self._lock:
+            self._changed()
 
     # -- helpers -----------------------------------------------------------------------------------
 

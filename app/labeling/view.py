@@ -44,7 +44,8 @@ class DragHandlers:
 
     on_start: Callable[[], None]
     on_move: Callable[[Array], None]
-    on_end: Callable[[], None]
+    on_end: Callable[[bool], None]
+    """Handed whether the connection broke while the gizmo was held."""
 
 
 @dataclass(frozen=True)
@@ -237,7 +238,7 @@ class SceneView:
                 T_world_gizmo = _from_viser(gizmo.position, gizmo.wxyz)
                 drag.on_move(T_world_gizmo @ self._T_gizmo_object)
             if event.phase == "end":
-                drag.on_end()
+                drag.on_end(event.client_id not in self._server.get_clients())
                 await asyncio.sleep(0)
 
 

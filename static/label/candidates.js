@@ -128,7 +128,7 @@ export function candidatesPart(page) {
     { keys: ["["], does: "Look at the candidate before; Y takes it", run: () => step(-1), repeats: true, machine: true },
     { keys: ["]"], does: "Look at the next candidate; Y takes it", run: () => step(+1), repeats: true, machine: true },
   ];
-  return { bindings, open, draw, accept, leave };
+  return { title: "The machine", bindings, open, draw, accept, leave };
 }
 
 /** Where the poses to choose from come from now; null where there are none. */

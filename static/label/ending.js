@@ -41,5 +41,5 @@ export function endingPart(page) {
   }
 
   const bindings = [{ keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask }];
-  return { bindings, draw };
+  return { title: "The task", bindings, draw };
 }

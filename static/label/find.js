@@ -39,5 +39,5 @@ export function findPart(page) {
   const bindings = [
     { keys: ["F"], does: "Find: the machine shows where the object may be", run: find, machine: true },
   ];
-  return { bindings, draw, leave };
+  return { title: "The machine", bindings, draw, leave };
 }

@@ -6,19 +6,42 @@ import { MOD } from "./keys.js";
 const SHOWN = { Mod: MOD, Escape: "Esc" };
 
 /**
- * Fills the overlay with {keys, does, caps?, machine?}, `caps` standing for many keys; returns the function
- * that opens it.
+ * Fills the overlay with {group, keys, does, caps?, machine?}, `caps` standing for many keys; returns the
+ * function that opens it.
  */
 export function setUpHelp(bindings) {
-  const rows = bindings.map(({ keys, does, caps, machine }) => {
-    const props = machine ? { "data-machine": "" } : {};
-    const shown = caps ? joinedCaps(caps) : keyCaps(keys);
-    return element("div", props, element("dt", {}, ...shown), element("dd", {}, does));
-  });
-  byId("key-list").replaceChildren(...rows);
-  const open = () => byId("keys").showModal();
+  const groups = Map.groupBy(bindings, ({ group }) => group);
+  byId("key-list").replaceChildren(...[...groups].map(([name, members]) => section(name, members.map(row))));
+  const search = byId("key-search");
+  search.addEventListener("input", () => filter(search.value.trim().toLowerCase()));
+  const open = () => {
+    search.value = "";
+    filter("");
+    byId("keys").showModal();
+  };
   byId("help").addEventListener("click", open);
   return open;
+}
+
+function section(name, rows) {
+  return element("section", { className: "key-group" }, element("h3", {}, name), element("dl", {}, ...rows));
+}
+
+function row({ keys, does, caps, machine }) {
+  const props = { "data-keys": keys.join(" "), ...(machine ? { "data-machine": "" } : {}) };
+  const shown = caps ? joinedCaps(caps) : keyCaps(keys);
+  return element("div", props, element("dt", {}, ...shown), element("dd", {}, does));
+}
+
+/** Shows what holds the words, and puts away the groups of which nothing is left. */
+function filter(words) {
+  const holds = (node) => node.textContent.toLowerCase().includes(words);
+  for (const group of document.querySelectorAll(".key-group")) {
+    const rows = [...group.querySelectorAll("dl > div")];
+    const isWhole = holds(group.querySelector("h3"));
+    for (const one of rows) one.hidden = !isWhole && !holds(one);
+    group.hidden = rows.every((one) => one.hidden);
+  }
 }
 
 function keyCaps(keys) {

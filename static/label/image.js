@@ -95,6 +95,7 @@ export function imagePart(page) {
     image.style.transform = `translate(${view.left}px, ${view.top}px) scale(${view.scale})`;
     image.classList.toggle("close", view.scale > CLOSE);
     setText(byId("zoom-fit-text"), zoom.isWhole() ? "Fit" : "Whole");
+    if (!zoom.isWhole()) box.dispatchEvent(new Event("zoomed"));
     drawSoon();
   }
 
@@ -153,7 +154,7 @@ export function imagePart(page) {
     { keys: ["Z"], does: "Zoom the image to the object, and back to all of it", run: fitOrWhole },
     { keys: ["H"], does: "Hide the outline on the image, and show it again", run: hideOrShow },
   ];
-  return { bindings, open, draw };
+  return { title: "Image and frames", bindings, open, draw };
 }
 
 /** The registration as if the object were where the operator looks before taking it. */

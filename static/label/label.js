@@ -2,37 +2,43 @@
  * The labelling page: joins the 3-D view, the panel, the keys and the server.
  *
  * What else there is on the page are parts: makers that take the `page` below and return any of
- * `bindings` (keys), `open(task, scene, object)`, called once, `draw(registration, before)`, called for
- * every new state, `attach(window)`, called for each document of the 3-D view, `leave()`, which leaves
- * a mode and tells whether there was one to leave, and `accept()`, which takes what it shows, likewise.
+ * `bindings` (keys, which the help shows under `title`), `open(task, scene, object)`, called once,
+ * `draw(registration, before)`, called for every new state, `attach(window)`, called for each document of the
+ * 3-D view, `leave()`, which leaves a mode and tells whether there was one to leave, and `accept()`, which
+ * takes what it shows, likewise.
  */
 
 import { del, get, post } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
-import { endingPart } from "./ending.js";
 import { candidatesPart } from "./candidates.js";
+import { connectionPart } from "./connection.js";
+import { endingPart } from "./ending.js";
 import { findPart } from "./find.js";
+import { guidePart } from "./guide.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { machinePart } from "./machine.js";
 import { goToNext } from "./next.js";
 import { numbersPart } from "./numbers.js";
-import { drawPanel, isSnapping, possible } from "./panel.js";
+import { drawPanel, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { seeingPart } from "./seeing.js";
+import { signInAgainHere } from "./sign-in-again.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
 import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
+import { isSnapping, waitingPart } from "./waiting.js";
 
 const taskId = location.pathname.split("/").filter(Boolean).at(-1);
 const message = messageArea(byId("message"));
 const pending = new Set();
+let me = null;
 let task = null;
 let registration = null;
 let snapRequest = null;
@@ -41,6 +47,7 @@ let connected = true;
 const page = {
   message,
   path,
+  me: () => me,
   registration: () => registration,
   isConnected: () => connected,
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
@@ -48,6 +55,8 @@ const page = {
 };
 const PARTS = [
   endingPart(page),
+  connectionPart(page),
+  guidePart(page),
   imagePart(page),
   machinePart(page),
   numbersPart(page),
@@ -59,6 +68,7 @@ const PARTS = [
   uncertaintyPart(page),
   seeingPart(page),
   viewsPart(page),
+  waitingPart(),
 ];
 
 const ACTIONS = {
@@ -73,16 +83,21 @@ const ACTIONS = {
   "offer-dismiss": () => post(path("dismiss")),
 };
 
+const grouped = (group, bindings) => bindings.map((binding) => ({ group, ...binding }));
 const BINDINGS = [
-  { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
-  { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
-  { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, machine: true },
-  { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
-  { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
-  { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
-  ...PARTS.flatMap((part) => part.bindings ?? []),
-  { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
-  { keys: ["?"], does: "Show these keys", run: () => openHelp() },
+  ...grouped("The task", [
+    { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
+    { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
+    { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
+    { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
+    { keys: ["?"], does: "Show these keys", run: () => openHelp() },
+  ]),
+  ...grouped("The machine", [
+    { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
+    { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, machine: true },
+    { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
+  ]),
+  ...PARTS.flatMap(({ title = "More", bindings = [] }) => grouped(title, bindings)),
 ];
 const openHelp = setUpHelp(BINDINGS);
 const attachKeys = keyBindings(BINDINGS);
@@ -100,6 +115,7 @@ try {
 
 async function openTask() {
   const start = () => post(`/api/tasks/${taskId}/registration`);
+  me = await signInAgainHere(focusView);
   const [started, described] = await Promise.all([start(), get(`/api/tasks/${taskId}`)]);
   task = described;
   showTask();

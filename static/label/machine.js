@@ -50,7 +50,7 @@ export function machinePart(page) {
   const bindings = [
     { keys: ["V"], does: "Live on or off: a ghost shows where a snap would land", run: toggle, machine: true },
   ];
-  return { bindings, open, draw };
+  return { title: "The machine", bindings, open, draw };
 }
 
 /** What there is to say in the view: {kind, text, confidence}, or null. */

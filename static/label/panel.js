@@ -2,6 +2,7 @@
 
 import { byId, icon, setText } from "../dom.js";
 import { hintFor } from "./hint.js";
+import { isSnapping, waitingText } from "./waiting.js";
 
 const SNAP_STATUS = {
   queued: "Waiting for a worker…",
@@ -16,10 +17,6 @@ const UNASKED = {
   cancelled: "",
   failed: "The machine finds nothing from here.",
 };
-
-export function isSnapping({ snap }) {
-  return snap?.state === "queued" || snap?.state === "running";
-}
 
 /** What can be done now, by action. */
 export function possible(registration, connected) {
@@ -86,7 +83,9 @@ function drawSnap(registration) {
 
 function snapStatus({ state, snap, offer, confidence }) {
   if (!snap || state !== "open") return "";
-  if (snap.state !== "done") return snap.asked_by === "machine" ? UNASKED[snap.state] : SNAP_STATUS[snap.state];
+  if (snap.state !== "done") {
+    return waitingText(snap) ?? (snap.asked_by === "machine" ? UNASKED : SNAP_STATUS)[snap.state];
+  }
   if (offer?.quiet) return "";
   if (offer) return "You moved the object meanwhile: the result is offered.";
   return confidence === null ? "" : `Snapped, confidence ${confidence.toFixed(2)}.`;

@@ -101,5 +101,5 @@ export function placePart(page) {
   }
 
   const bindings = [{ keys: ["P"], does: "Place the object by a click; Esc leaves this", run: () => use(!on) }];
-  return { bindings, attach, leave, draw };
+  return { title: "The object", bindings, attach, leave, draw };
 }

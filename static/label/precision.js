@@ -142,7 +142,7 @@ export function precisionPart(page) {
     { keys: ["G"], does: "Gizmo along the object, the world", run: () => useGizmo(otherGizmo()) },
     { keys: ["Shift+P"], does: "Put the object down on the surface", run: rest },
   ];
-  return { bindings, draw };
+  return { title: "The object", bindings, draw };
 }
 
 function press(buttons, isPressed) {

@@ -40,7 +40,7 @@ export function seeingPart(page) {
     { keys: ["B"], does: "Hide the cloud, and show it again", run: () => toggle("cloud") },
     { keys: ["M"], does: "Hide the mesh, and show it again", run: () => toggle("mesh") },
   ];
-  return { bindings, draw };
+  return { title: "The view", bindings, draw };
 }
 
 const wanted = () => ({ ...AT_FIRST, ...JSON.parse(localStorage.getItem(REMEMBERED)) });

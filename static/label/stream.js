@@ -3,6 +3,8 @@
 import { ApiError } from "../api.js";
 
 const RETRY_MS = 1000;
+/** The server tells something every ten seconds: after a longer silence the connection is dead, as after a sleep. */
+const LONGEST_SILENCE_MS = 25_000;
 /** Tells this page from others of the same registration: the newest takes over. */
 const PAGE = crypto.getRandomValues(new Uint32Array(4)).join("-").slice(0, 40);
 
@@ -12,19 +14,33 @@ const PAGE = crypto.getRandomValues(new Uint32Array(4)).join("-").slice(0, 40);
  * onRefused(error) when the server is there again but will not have it.
  */
 export function followRegistration(id, { resume, onRegistration, onLost, onTakenOver, onRefused }) {
+  let source = null;
+  let heardAt = 0;
+
   function connect() {
-    const source = new EventSource(`/api/registrations/${id}/stream?page=${PAGE}`);
-    source.addEventListener("registration", (event) => onRegistration(JSON.parse(event.data)));
+    source = new EventSource(`/api/registrations/${id}/stream?page=${PAGE}`);
+    heardAt = Date.now();
+    source.addEventListener("registration", (event) => {
+      heardAt = Date.now();
+      onRegistration(JSON.parse(event.data));
+    });
     source.addEventListener("taken_over", () => {
-      source.close();
+      leave();
       onTakenOver();
     });
-    source.addEventListener("error", () => {
-      // EventSource gives up after an HTTP error and hides which one it was: do the reconnecting here.
-      source.close();
-      onLost();
-      setTimeout(reconnect, RETRY_MS);
-    });
+    // EventSource gives up after an HTTP error and hides which one it was: do the reconnecting here.
+    source.addEventListener("error", lose);
+  }
+
+  function leave() {
+    source.close();
+    source = null;
+  }
+
+  function lose() {
+    leave();
+    onLost();
+    setTimeout(reconnect, RETRY_MS);
   }
 
   async function reconnect() {
@@ -38,4 +54,5 @@ export function followRegistration(id, { resume, onRegistration, onLost, onTaken
   }
 
   connect();
+  setInterval(() => source && Date.now() - heardAt > LONGEST_SILENCE_MS && lose(), RETRY_MS);
 }

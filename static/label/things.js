@@ -55,7 +55,7 @@ export function thingsPart(page) {
   }
 
   const bindings = [{ keys: ["Shift+B"], does: "Hide or show what is done in this scene", run: toggle }];
-  return { bindings, draw };
+  return { title: "The view", bindings, draw };
 }
 
 const WORDS = { open: "open", submitted: "done", skipped: "skipped" };

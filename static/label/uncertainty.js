@@ -56,7 +56,7 @@ export function uncertaintyPart(page) {
   const bindings = [
     { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, machine: true },
   ];
-  return { bindings, attach, draw };
+  return { title: "The machine", bindings, attach, draw };
 }
 
 function sentence({ kind, motion, extent }) {

@@ -30,5 +30,5 @@ export function viewsPart(page) {
     { keys: ["9"], does: "Go around the object, to the left", run: () => look("left"), repeats: true },
     { keys: ["0"], does: "Go around the object, to the right", run: () => look("right"), repeats: true },
   ];
-  return { bindings, draw };
+  return { title: "The view", bindings, draw };
 }

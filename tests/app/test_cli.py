@@ -102,6 +102,17 @@ def test_a_new_user_gets_a_link(snap6d, state):
     assert "already is a user named 'ann'" in failure(snap6d(state, "user", "add", "ann"))
 
 
+def test_who_is_there_already_gets_another_link(snap6d, state):
+    snap6d(state, "user", "add", "ann", "--role", "reviewer")
+    printed = snap6d(state, "user", "link", "ann").stdout.splitlines()
+    assert printed[0] == "User ann may sign in, once, with this link:"
+    database = opened(state)
+    auth = Auth(database)
+    assert auth.identify_session(auth.sign_in_with_link(printed[1].split("#")[1])).role == Role.REVIEWER
+    database.close()
+    assert failure(snap6d(state, "user", "link", "bob")) == "there is no user 'bob'"
+
+
 def test_a_public_address_is_in_the_link(snap6d, state):
     printed = snap6d(state, "user", "add", "ann", SNAP6D_PUBLIC_URL="https://snap.example/").stdout
     assert "https://snap.example/sign-in#" in printed

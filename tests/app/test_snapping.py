@@ -131,7 +131,7 @@ def test_progress_arrives_while_it_runs(snapper, model):
     wait_until(lambda: len(outcome.shares) >= 5, "progress")
     assert not outcome.ended.is_set()
     cancel()
-    assert outcome.shares == sorted(outcome.shares) and 0 < outcome.shares[0] <= 1
+    assert outcome.shares == sorted(outcome.shares) and 0 == outcome.shares[0] < outcome.shares[-1] <= 1
 
 
 def test_a_cancelled_snap_brings_nothing_and_its_worker_is_free_at_once(snapper, model):
@@ -187,6 +187,25 @@ def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> No
     cancel()
     assert isinstance(result_of(told), JobResult)
     assert order == ["asked for", "live"] and told.shares == []
+
+
+def test_it_is_known_how_a_snap_stands(snapper, model):
+    running = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
+    assert all(outcome.moved.wait(LONGEST) for outcome, _ in running)
+    waiting = [new_job(model, snapper.topic) for _ in range(2)]
+    cancels = [request(snapper, job, model)[1] for job in waiting]
+    live = new_job(model)
+    snapper.request(live, model, print, print, priority=-1)
+    stands = [snapper.standing(job.snap_id) for job in waiting]
+    assert [(standing.workers, standing.ahead) for standing in stands] == [(2, 0), (2, 1)]
+    assert all(standing.seconds >= 0 for standing in stands)
+    assert snapper.standing(live.snap_id).ahead == 2
+    assert snapper.waiting_count() == 2
+    cancels[0]()
+    assert snapper.standing(waiting[1].snap_id).ahead == 0
+    assert snapper.standing(waiting[0].snap_id) is None
+    ids = list(snapper._pending)
+    assert all(snapper.standing(snap_id).ahead == 0 for snap_id in ids[:2])
 
 
 def test_an_object_that_no_worker_knows_is_sent_along(snapper):

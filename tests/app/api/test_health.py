@@ -20,7 +20,13 @@ def healthy(client: httpx.Client) -> httpx.Response | None:
 
 def test_it_is_ready_with_database_and_workers(live: LiveServer) -> None:
     answer = wait_until(lambda: healthy(live.stranger()), "the workers")
-    assert answer.json() == {"status": "ready", "version": __version__, "database": True, "workers": 2}
+    assert answer.json() == {
+        "status": "ready",
+        "version": __version__,
+        "database": True,
+        "workers": 2,
+        "waiting": 0,
+    }
 
 
 def test_it_waits_for_workers(state_dir: Path) -> None:
@@ -35,6 +41,7 @@ def test_it_waits_for_workers(state_dir: Path) -> None:
             "version": __version__,
             "database": True,
             "workers": 0,
+            "waiting": 0,
         }
 
 

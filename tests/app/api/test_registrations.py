@@ -11,6 +11,7 @@ import httpx
 import numpy as np
 import pytest
 
+from app.api import registrations
 from app.auth import Actor, Role
 from app.labeling.desk import Seat
 from registration_core import pose
@@ -343,6 +344,20 @@ def test_a_stream_may_skip_but_always_tells_the_last(
         assert count < 50
         assert np.allclose(message["T_world_object"], pose.exp([0.199, 0, 0.5, 0, 0, 0]))
         assert message["saved"] and message["can_undo"]
+
+
+def test_a_stream_gives_signs_of_life_until_the_login_ends(
+    live: LiveServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registrations, "SECONDS_BETWEEN_SIGNS_OF_LIFE", 0.05)
+    person = live.person("whose login ends")
+    registration = begin(person)
+    with person.stream("GET", f"{url_of(registration)}/stream") as answer:
+        told = messages(answer)
+        assert [next(told) for _ in range(4)] == [registration] * 4
+        assert person.post("/api/sign-out").status_code == 204
+        for again in told:
+            assert again == registration
 
 
 def test_a_stream_keeps_its_session_until_it_is_left(live: LiveServer, script: httpx.Client) -> None:

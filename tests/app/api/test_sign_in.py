@@ -27,7 +27,7 @@ def test_a_password_signs_in_until_signing_out(server: LiveServer, ann: int) -> 
     client = server.stranger()
     answer = sign_in(client, "ann", PASSWORD)
     assert answer.status_code == 204 and answer.content == b""
-    assert client.get("/api/me").json() == {"id": ann, "name": "ann", "role": "reviewer"}
+    assert client.get("/api/me").json() == {"id": ann, "name": "ann", "role": "reviewer", "submitted": 0}
     secret = client.cookies[SESSION_COOKIE]
     assert client.post("/api/sign-out").status_code == 204
     assert SESSION_COOKIE not in client.cookies

@@ -49,6 +49,8 @@ def running(script: httpx.Client, near: dict[str, Any]) -> Iterator[str]:
     """A snap that runs for long, on a worker."""
     snap_id = request_snap(script, near, config=SLOW_SNAP)
     wait_until(lambda: script.get(f"/api/snaps/{snap_id}").json()["progress"] > 0, "the snap to run")
+    standing = script.get(f"/api/snaps/{snap_id}").json()["standing"]
+    assert standing["workers"] == 2 and standing["ahead"] == 0 and standing["seconds"] > 0
     yield snap_id
     script.delete(f"/api/snaps/{snap_id}")
 
@@ -58,6 +60,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
 ) -> None:
     done = finished_snap(script, request_snap(script, near, seed=7))
     assert (done["state"], done["progress"], done["message"]) == ("done", 1.0, None)
+    assert done["standing"] is None
     estimate = done["estimate"]
     frame = live.services.desk._seats[near["id"]].frames[near["frame_id"]]
     with live.services.database.read() as session:

@@ -9,8 +9,19 @@ def test_the_newest_page_takes_the_place():
     assert told == []
     chair.sit("b", lambda: told.append("b"))
     assert told == ["a"]
-    chair.sit("a", lambda: told.append("a again"))
+    chair.sit("c", lambda: told.append("c"))
     assert told == ["a", "b"]
+
+
+def test_who_comes_back_after_a_newer_page_has_come_gives_way():
+    chair, told = Chair(), []
+    chair.sit("a", lambda: told.append("a"))()  # its connection broke
+    chair.sit("b", lambda: told.append("b"))
+    stand_up = chair.sit("a", lambda: told.append("a again"))
+    assert told == ["a again"]
+    stand_up()
+    chair.sit("c", lambda: told.append("c"))
+    assert told == ["a again", "b"]
 
 
 def test_a_page_that_comes_back_does_not_drive_itself_out():

@@ -185,6 +185,21 @@ def test_a_session_is_watched_as_long_as_its_view_is_open(live):
     wait_until(lambda: seat.watchers == 0, "the view to be left")
 
 
+def test_the_page_learns_that_its_view_came_and_went(live):
+    hal = Operator(live, "hal of the proxy")
+    url = f"/api/registrations/{hal.id}"
+    told: list[bool] = []
+    seat = live.services.desk._seats[hal.id]
+    seat.session.subscribe(lambda _state: told.append(seat.viewers > 0))
+    assert not hal.http.get(url).json()["view_open"]
+    with hal.view() as view:
+        view.node("MeshMessage", "/object/mesh")
+        wait_until(lambda: hal.http.get(url).json()["view_open"], "the view to be open")
+    wait_until(lambda: not hal.http.get(url).json()["view_open"], "the view to be left")
+    wait_until(lambda: told[-1:] == [False], "the page to be told")
+    assert True in told
+
+
 def test_text_ends_the_connection_and_nothing_else(live, ann):
     with ann.view() as view:
         view.send_text("hello")

@@ -11,7 +11,7 @@ from app.event_log import NewEvent
 from app.labeling.history import History, Step
 from app.labeling.layers import Layers
 from app.labeling.search import SearchOrder, SearchResult
-from app.labeling.session import LabelingSession, SessionState
+from app.labeling.session import BROKEN_DRAG, LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.labeling.track import ActionError
 from app.tables import Condition, EstimateRow
@@ -206,6 +206,18 @@ def test_a_drag_that_goes_nowhere_is_no_change(bench):
     assert bench.log.events == []
     assert not bench.state.can_undo
     assert not bench.state.dragging
+
+
+def test_a_drag_that_a_lost_connection_ends_is_kept_and_told():
+    bench = Bench(condition="auto")
+    bench.session.start_drag()
+    bench.session.drag_to(shifted(0.02))
+    bench.session.end_drag(broken=True)
+    assert np.array_equal(bench.state.T_world_object, shifted(0.02))
+    assert bench.state.message == BROKEN_DRAG
+    assert [event.kind for event in bench.log.events] == ["drag"]  # no sign to the machine
+    bench.session.undo(Actor.HUMAN)
+    assert bench.state.message is None
 
 
 def test_moves_and_ends_without_a_start_are_ignored(bench):

@@ -28,6 +28,8 @@ class Hand:
     calls: list[str] = field(default_factory=list)
     poses: list[np.ndarray] = field(default_factory=list)
     broken: bool = False
+    lost: bool = False
+    """Whether the last drag ended with its connection."""
 
     def start(self) -> None:
         self.calls.append("start")
@@ -36,8 +38,9 @@ class Hand:
         self.calls.append("move")
         self.poses.append(T_world_object)
 
-    def end(self) -> None:
+    def end(self, broken: bool) -> None:
         self.calls.append("end")
+        self.lost = broken
         if self.broken:
             raise OSError("no space left")
 
@@ -234,6 +237,7 @@ def test_many_quick_drags_stay_apart(view, hand, model):
             client.drag([gizmo_at(T_WORLD_OBJECT @ pose.exp([0.001 * i, 0, 0, 0, 0, 0]), model)])
         hand.wait_for_ends(20)
     assert hand.calls == ["start", "move", "move", "end"] * 20
+    assert not hand.lost
 
 
 def test_a_connection_lost_in_mid_drag_ends_the_drag(view, hand, model):
@@ -242,6 +246,7 @@ def test_a_connection_lost_in_mid_drag_ends_the_drag(view, hand, model):
         client.move(gizmo_at(T_WORLD_OBJECT, model))
         wait_until(lambda: "move" in hand.calls, "the drag to begin")
     hand.wait_for_ends(1)
+    assert hand.lost
 
 
 def test_a_drag_that_cannot_be_saved_does_not_break_the_view(view, hand, model):

@@ -1,0 +1,128 @@
+/** The first task, step by step: one hint at a time, checked off when what it asks for has happened. */
+
+import { byId, element, setText } from "../dom.js";
+import { MOD } from "./keys.js";
+
+const TURNED = 30; // page pixels of a drag beside the object that turn the view visibly
+
+/**
+ * In order. `text` has keys in backticks; `isDone(now, before)` compares two states of the registration. What
+ * the server does not know of, the view and the image, is told by `done(name)` below.
+ */
+const STEPS = [
+  {
+    name: "drag",
+    text: "Drag one of the object's arrows: it moves that way. Squares move it in a plane, arcs turn it.",
+    isDone: (now, before) => before.dragging && !now.dragging && now.can_undo,
+  },
+  { name: "turn", text: "Turn the view: drag beside the object. The wheel comes closer." },
+  {
+    name: "snap",
+    text: "Bring the object roughly to its points, then press `Space`: the machine snaps it into place.",
+    isDone: (now, before) => now.snap?.state === "done" && before.snap?.state !== "done",
+    machine: true,
+  },
+  { name: "image", text: "Press `Z`: the image comes closer. Where the pose is right, the outline follows the edge." },
+  {
+    name: "undo",
+    text: `Press \`${MOD} Z\`: whatever was done, by you or the machine, can be undone.`,
+    isDone: (now, before) => now.can_redo && !before.can_redo,
+  },
+  {
+    name: "redo",
+    text: `Press \`${MOD} Shift Z\`, and it comes back.`,
+    isDone: (now, before) => before.can_redo && !now.can_redo,
+  },
+  {
+    name: "submit",
+    text: "Does it lie on its points from every side? Then press `Enter` to submit it.",
+    isDone: (now, before) => now.state === "submitted" && before.state === "open",
+  },
+];
+const END = "That is all you need. `?` shows every key, and this tour again.";
+
+/** A part of the labelling page. */
+export function guidePart(page) {
+  const done = new Set();
+  let steps = STEPS;
+  let isOn = false;
+
+  byId("guide-skip").addEventListener("click", stop);
+  byId("guide-start").addEventListener("click", () => {
+    byId("keys").close();
+    done.clear();
+    start();
+  });
+  byId("image").addEventListener("zoomed", () => check("image"));
+  for (const button of document.querySelectorAll("[data-look]")) {
+    button.addEventListener("click", () => check("turn"));
+  }
+
+  /** Somebody who has submitted nothing yet is shown around, but once. */
+  function open(task) {
+    steps = STEPS.filter(({ machine }) => !machine || task.condition !== "manual");
+    const remembered = JSON.parse(localStorage.getItem(key()));
+    for (const name of remembered?.done ?? []) done.add(name);
+    if (remembered ? remembered.isOn : page.me().submitted === 0) start();
+  }
+
+  const key = () => `snap6d.guide.${page.me().id}`;
+  const remember = () => localStorage.setItem(key(), JSON.stringify({ isOn, done: [...done] }));
+
+  function start() {
+    isOn = true;
+    show();
+  }
+
+  function stop() {
+    isOn = false;
+    show();
+  }
+
+  function draw(now, before) {
+    for (const { name, isDone } of steps) if (before && isDone?.(now, before)) check(name);
+  }
+
+  function check(name) {
+    if (!isOn || done.has(name)) return;
+    done.add(name);
+    show();
+  }
+
+  function show() {
+    const next = steps.find(({ name }) => !done.has(name));
+    byId("guide").hidden = !isOn;
+    byId("guide-text").replaceChildren(...withKeys(next?.text ?? END));
+    byId("guide-steps").replaceChildren(...steps.map((step) => mark(done.has(step.name), step === next)));
+    setText(byId("guide-place"), next ? `${steps.indexOf(next) + 1} of ${steps.length}` : "Done");
+    setText(byId("guide-skip"), next ? "Skip" : "Close");
+    if (!next) isOn = false; // seen once, it does not come back with the next task
+    remember();
+  }
+
+  function attach(view) {
+    let pressed = null;
+    const capture = { capture: true };
+    view.addEventListener("pointerdown", (event) => (pressed = event), capture);
+    view.addEventListener("wheel", () => check("turn"), capture);
+    view.addEventListener(
+      "pointerup",
+      ({ clientX, clientY }) => {
+        const way = pressed ? Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY) : 0;
+        if (way > TURNED && !page.registration()?.dragging) check("turn");
+        pressed = null;
+      },
+      capture,
+    );
+  }
+
+  return { open, draw, attach };
+}
+
+function withKeys(text) {
+  return text.split("`").map((part, index) => (index % 2 ? element("kbd", {}, part) : part));
+}
+
+function mark(isDone, isNext) {
+  return element("li", { className: isDone ? "done" : isNext ? "next" : "" }, isDone ? "✓" : "");
+}

@@ -1,0 +1,61 @@
+/** A snap under way: whether it waits for a worker, or keeps one long, and since when. */
+
+import { get } from "../api.js";
+import { byId, setText } from "../dom.js";
+
+const PATIENCE_MS = 2000;
+const ASK_AGAIN_MS = 1000;
+const LONG_SECONDS = 10;
+const NO_WORKER = "No worker is there; Snap works again when one is up. You can go on by hand.";
+const SLOW = "The worker takes long. You can go on by hand, or cancel.";
+
+let told = { id: null, text: "" };
+
+export function isSnapping({ snap }) {
+  return snap?.state === "queued" || snap?.state === "running";
+}
+
+/** What there is to say of a snap that takes longer than usual, or null. */
+export function waitingText({ id }) {
+  return id !== null && id === told.id ? told.text : null;
+}
+
+/** A part of the labelling page. */
+export function waitingPart() {
+  let followed = null;
+  let timer = null;
+
+  function draw(registration) {
+    const id = isSnapping(registration) ? registration.snap.id : null;
+    if (id === followed) return;
+    followed = id;
+    tell(null, "", "");
+    clearTimeout(timer);
+    if (id !== null) timer = setTimeout(ask, PATIENCE_MS, id);
+  }
+
+  async function ask(id) {
+    // Where the server does not answer, the page has said so: what follows here would only repeat it.
+    const snap = await get(`/api/snaps/${id}`).catch(() => null);
+    if (id !== followed) return;
+    if (snap?.standing) {
+      tell(id, textFor(snap), `${Math.round(snap.standing.seconds)} s`);
+      setText(byId("snap-status"), told.text);
+    }
+    timer = setTimeout(ask, ASK_AGAIN_MS, id);
+  }
+
+  return { draw };
+}
+
+/** The seconds stand apart, since they are not to be read out again and again. */
+function tell(id, text, seconds) {
+  told = { id, text };
+  setText(byId("snap-seconds"), seconds);
+}
+
+function textFor({ state, standing: { workers, ahead, seconds } }) {
+  if (state === "running") return seconds < LONG_SECONDS ? "Snapping…" : SLOW;
+  if (workers === 0) return NO_WORKER;
+  return `All workers are busy; ${ahead === 0 ? "yours is next" : `${ahead} before you`}.`;
+}

@@ -1,0 +1,60 @@
+"""The first task, step by step, for somebody new."""
+
+import pytest
+from playwright.sync_api import Browser, expect
+
+from tests.e2e.conftest import take_picture
+from tests.e2e.test_labelling import Desk
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+SLOWEST = 60_000
+
+
+def test_a_new_operator_is_shown_around_once(server: Server, browser: Browser) -> None:
+    context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
+    context.set_default_timeout(SLOWEST)
+    page = context.new_page()
+    page.goto(server.new_link("newcomer"))
+    desk = Desk(page, server)
+    card, text = page.locator("#guide"), page.locator("#guide-text")
+    place = page.locator("#guide-place")
+
+    expect(text).to_contain_text("Drag one of the object's arrows")
+    expect(place).to_have_text("1 of 7")
+    take_picture(page, "label-guide")
+    desk.drag("tx", 0.02)
+    expect(text).to_contain_text("Turn the view")
+    page.mouse.move(850, 560)
+    page.mouse.down()
+    page.mouse.move(930, 540, steps=6)
+    page.mouse.up()
+    expect(text).to_contain_text("Space: the machine")
+    take_picture(page, "label-guide-snap")
+    page.keyboard.press("Space")
+    expect(text).to_contain_text("the outline follows the edge", timeout=SLOWEST)
+    page.reload()  # it is remembered how far they were
+    expect(text).to_contain_text("the outline follows the edge", timeout=SLOWEST)
+    expect(page.locator("#undo")).to_be_enabled(timeout=SLOWEST)
+    page.keyboard.press("z")
+    expect(text).to_contain_text("can be undone")
+    page.keyboard.press("Control+z")
+    expect(text).to_contain_text("it comes back")
+    page.keyboard.press("Control+Shift+z")
+    expect(text).to_contain_text("to submit it")
+    expect(place).to_have_text("7 of 7")
+    page.keyboard.press("Enter")
+    expect(text).to_contain_text("That is all you need", timeout=SLOWEST)
+    take_picture(page, "label-guide-end")
+    page.locator("#next-task").click()
+    expect(page.locator("#undo")).to_be_attached()
+    expect(page.locator("#saved")).to_contain_text("saved", timeout=SLOWEST)
+    expect(card).to_be_hidden()
+
+    page.keyboard.press("?")
+    page.get_by_role("button", name="Show me around").click()
+    expect(card).to_be_visible()
+    page.get_by_role("button", name="Skip").click()
+    expect(card).to_be_hidden()
+    context.close()
