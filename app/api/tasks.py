@@ -69,6 +69,7 @@ class OperatorRef(BaseModel):
 
     name: str
     state: str
+    registration_id: int
 
 
 class TaskOut(BaseModel):
@@ -220,7 +221,9 @@ def _out(row: Task, user_id: int) -> TaskOut:
         mode=row.mode,
         condition=row.condition,
         state="submitted" if "submitted" in states else "in_progress" if states else "open",
-        operators=[OperatorRef(name=r.user.name, state=r.state) for r in row.registrations],
+        operators=[
+            OperatorRef(name=r.user.name, state=r.state, registration_id=r.id) for r in row.registrations
+        ],
         mine=mine,
         thumbnail_url=f"/api/tasks/{row.id}/thumbnail.jpg",
     )

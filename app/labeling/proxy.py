@@ -27,7 +27,11 @@ async def view_page(
     path: str, request: Request, seat: SeatDep, services: Annotated[Services, Depends(get_services)]
 ) -> Response:
     """A file of the view's page."""
-    port = await asyncio.to_thread(services.desk.view_port, seat)
+    return await fetched(request, await asyncio.to_thread(services.desk.view_port, seat), path)
+
+
+async def fetched(request: Request, port: int, path: str) -> Response:
+    """A file of the page of the view on a loopback port."""
     client: httpx.AsyncClient = request.app.state.http
     answer = await client.get(f"http://127.0.0.1:{port}/{quote(path)}")
     return Response(
@@ -50,7 +54,7 @@ async def view_socket(socket: WebSocket, registration_id: Id) -> None:
     port = await asyncio.to_thread(services.desk.view_port, seat)
     leave = services.desk.watch(seat)
     try:
-        await _join(socket, port)
+        await join(socket, port)
     finally:
         leave()
 
@@ -67,7 +71,8 @@ def _allowed_seat(socket: WebSocket, registration_id: int) -> Seat | None:
         return None
 
 
-async def _join(socket: WebSocket, port: int) -> None:
+async def join(socket: WebSocket, port: int) -> None:
+    """Hand messages to and fro between a page and the view on a loopback port, until either leaves."""
     protocols = [
         websockets.Subprotocol(name)
         for name in socket.scope["subprotocols"]

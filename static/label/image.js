@@ -1,6 +1,5 @@
 /** The colour image of the frame, with the outline of the object or its shape on top; zoom; the other frames. */
 
-import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { frameStrip } from "./frames.js";
 import { extentInPicture, loadMesh, meshDrawing, shownCamera } from "./outline.js";
@@ -47,7 +46,7 @@ export function imagePart(page) {
 
   async function chooseFrame(frame) {
     if (frame === shown || !page.isConnected()) return;
-    await put(page.path("frame"), { frame_id: frame.id }).catch(page.message.problem);
+    await page.showFrame(frame).catch(page.message.problem);
   }
 
   function draw(newest) {

@@ -7,7 +7,7 @@
  * a mode and tells whether there was one to leave.
  */
 
-import { del, get, post } from "../api.js";
+import { del, get, post, put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { messageArea } from "../message.js";
 import { setUpHelp } from "./help.js";
@@ -38,6 +38,7 @@ const page = {
   isConnected: () => connected,
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
+  showFrame: (frame) => put(path("frame"), { frame_id: frame.id }),
 };
 const PARTS = [
   imagePart(page),
@@ -148,6 +149,7 @@ function reportSnap(before, snap) {
 
 async function showSubmitted() {
   message.clear();
+  byId("replay").href = `/replay/${registration.id}`;
   await Promise.all([showNext(), showDatasetProgress()]).catch(message.problem);
 }
 
