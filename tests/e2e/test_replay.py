@@ -13,6 +13,9 @@ from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
+PATIENCE = 60_000
+"""Milliseconds."""
+
 PLACE = "name => window.__viserMutable.nodeRefFromName[name].position.toArray()"
 OBJECT_AT = """([name, point]) => {
   const at = window.__viserMutable.nodeRefFromName[name].position.toArray();
@@ -47,7 +50,7 @@ def go_to(page: Page, share: float) -> float:
 
 
 def wait_for_object(frame: Frame, point: np.ndarray) -> None:
-    frame.wait_for_function(OBJECT_AT, arg=[GIZMO, point.tolist()], timeout=60_000)
+    frame.wait_for_function(OBJECT_AT, arg=[GIZMO, point.tolist()], timeout=PATIENCE)
 
 
 def test_a_registration_is_played_back_from_its_log(
@@ -69,33 +72,33 @@ def test_a_registration_is_played_back_from_its_log(
     take_picture(page, "replay-drag")
 
     page.locator("#events button", has_text="Snap applied").click()
-    expect(page.locator("#ghost")).to_contain_text("Put here by the machine")
+    expect(page.locator("#ghost")).to_contain_text("Put here by the machine", timeout=PATIENCE)
     page.emulate_media(color_scheme="dark")
     take_picture(page, "replay-dark")
     page.keyboard.press(".")
-    expect(page.locator("#events [aria-current]")).to_contain_text("Undo")
-    expect(page.locator("#ghost")).to_be_hidden()
+    expect(page.locator("#events [aria-current]")).to_contain_text("Undo", timeout=PATIENCE)
+    expect(page.locator("#ghost")).to_be_hidden(timeout=PATIENCE)
     page.keyboard.press(".")
-    expect(page.locator("#events [aria-current]")).to_contain_text("Submitted")
-    expect(page.locator("#distance")).to_have_text("0.0 mm · 0.0° to the end")
+    expect(page.locator("#events [aria-current]")).to_contain_text("Submitted", timeout=PATIENCE)
+    expect(page.locator("#distance")).to_have_text("0.0 mm · 0.0° to the end", timeout=PATIENCE)
     (submitted,) = desk.events("submit")
     submitted_origin = np.array(submitted["T_after"])[:3, 3]
     wait_for_object(frame, start + submitted_origin - np.array(drag["T_before"])[:3, 3])
 
     page.keyboard.press("Space")  # from the end it begins anew
-    expect(page.locator("#play-text")).to_have_text("Pause")
-    expect(page.locator("#events [aria-current]")).to_contain_text("Opened")
+    expect(page.locator("#play-text")).to_have_text("Pause", timeout=PATIENCE)
+    expect(page.locator("#events [aria-current]")).to_contain_text("Opened", timeout=PATIENCE)
     page.wait_for_function("() => document.getElementById('scrub').valueAsNumber > 0.2")
     page.keyboard.press("Space")
-    expect(page.locator("#play-text")).to_have_text("Play")
+    expect(page.locator("#play-text")).to_have_text("Play", timeout=PATIENCE)
 
     page.set_viewport_size({"width": 1920, "height": 1080})
     page.emulate_media(color_scheme="light")
     page.locator("#events button", has_text="Snap applied").click()
-    expect(page.locator("#ghost")).to_be_visible()
+    expect(page.locator("#ghost")).to_be_visible(timeout=PATIENCE)
     take_picture(page, "replay-large")
 
     other = open_page(server.new_link("somebody else"))
     other.wait_for_url(f"{server.url}/")
     other.goto(page.url)
-    expect(other.locator("#closed")).to_contain_text("no registration")
+    expect(other.locator("#closed")).to_contain_text("no registration", timeout=PATIENCE)
