@@ -16,6 +16,7 @@ from app.api import (
     placement,
     problems,
     registrations,
+    replay,
     scene_things,
     scenes,
     searches,
@@ -31,6 +32,8 @@ from app.event_log import EventLog
 from app.export_jobs import ExportJobs
 from app.labeling import proxy
 from app.labeling.desk import Desk
+from app.replay import proxy as replay_proxy
+from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.services import Services
 from app.snapping import Snapper, create_snapper
@@ -60,6 +63,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         data=data,
         snapper=snapper,
         desk=Desk(database, log, data, snapper),
+        replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
     )
 
@@ -98,6 +102,7 @@ def create_app(services: Services) -> FastAPI:
         tasks,
         registrations,
         scene_things,
+        replay,
         placement,
         snaps,
         searches,
@@ -105,6 +110,7 @@ def create_app(services: Services) -> FastAPI:
         exports,
     ):
         app.include_router(module.router)
+    app.include_router(replay_proxy.router)
     app.include_router(proxy.router)
     pages.install(app)
     return app
@@ -114,10 +120,12 @@ async def _clean_up(services: Services) -> None:
     while True:
         await asyncio.sleep(SECONDS_BETWEEN_CLEANINGS)
         await asyncio.to_thread(services.desk.close_idle)
+        await asyncio.to_thread(services.replays.close_idle)
 
 
 def _close(services: Services) -> None:
     services.desk.close()
+    services.replays.close()
     services.export_jobs.close()
     services.snapper.close()
     services.database.close()

@@ -8,6 +8,7 @@ from app.database import Database
 from app.event_log import EventLog
 from app.export_jobs import ExportJobs
 from app.labeling.desk import Desk
+from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.snapping import Snapper
 from app.storage import FileStore
@@ -25,4 +26,5 @@ class Services:
     data: SceneData
     snapper: Snapper
     desk: Desk
+    replays: Replays
     export_jobs: ExportJobs

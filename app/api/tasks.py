@@ -70,6 +70,7 @@ class OperatorRef(BaseModel):
     name: str
     state: str
     skip_reason: str | None
+    registration_id: int
 
 
 class TaskOut(BaseModel):
@@ -242,7 +243,8 @@ def _out(row: Task, user_id: int) -> TaskOut:
         condition=row.condition,
         state=_state_of(row),
         operators=[
-            OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason) for r in row.registrations
+            OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason, registration_id=r.id)
+            for r in row.registrations
         ],
         mine=mine,
         thumbnail_url=f"/api/tasks/{row.id}/thumbnail.jpg",

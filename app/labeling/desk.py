@@ -16,9 +16,11 @@ from app import __version__
 from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import STATE_AFTER, EventLog, NewEvent
+from app.labeling.camera_watch import CameraWatch
 from app.labeling.chair import Chair
 from app.labeling.coloring import Coloring
 from app.labeling.depth_reading import DepthReading, DepthView
+from app.labeling.frame_view import first_view_of, show_cloud_of
 from app.labeling.history import replay
 from app.labeling.layers import Layers
 from app.labeling.machine import SamePose
@@ -28,7 +30,7 @@ from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
-from app.labeling.view import DragHandlers, FirstView, SceneView
+from app.labeling.view import DragHandlers, SceneView
 from app.memory import give_back
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
@@ -184,17 +186,8 @@ class Desk:
             _close(seat)
 
     def _owned(self, registration_id: int, identity: Identity) -> Registration:
-        with self._database.read() as session:
-            registration = session.scalar(
-                select(Registration)
-                .where(Registration.id == registration_id, Registration.user_id == identity.user_id)
-                .options(
-                    joinedload(Registration.task).joinedload(Task.object),
-                    joinedload(Registration.task).joinedload(Task.scene).selectinload(Scene.frames),
-                    joinedload(Registration.task).joinedload(Task.frame),
-                )
-            )
-        if registration is None:
+        registration = whole_registration(self._database, registration_id)
+        if registration is None or registration.user_id != identity.user_id:
             raise _not_found(registration_id)
         return registration
 
@@ -347,7 +340,10 @@ class Desk:
     def _make_view(self, seat: Seat) -> SceneView:
         state = seat.session.snapshot()
         drag = DragHandlers(seat.session.start_drag, seat.session.drag_to, seat.session.end_drag)
-        view = SceneView(seat.model, state.T_world_object, self._first_view(seat, state), drag)
+        frame = seat.frames[state.frame_id]
+        first_view = first_view_of(frame, self._data.depth(frame))
+        view = SceneView(seat.model, state.T_world_object, first_view, drag)
+        view.watch_camera(CameraWatch(seat.session.look_from))
         shown = _Shown(view, self._data, seat.frames, lambda snap_id: self.uncertainty(seat, snap_id))
         shown.update(state)
         seat.session.subscribe(shown.update)
@@ -357,14 +353,19 @@ class Desk:
         seat.session.subscribe(coloring.update)
         return view
 
-    def _first_view(self, seat: Seat, state: SessionState) -> FirstView:
-        frame = seat.frames[state.frame_id]
-        depth = self._data.depth(frame)
-        measured = depth[depth > 0]
-        return FirstView(
-            T_world_camera=np.array(frame.T_world_camera),
-            field_of_view=2.0 * float(np.arctan(frame.height / (2.0 * frame.fy))),
-            distance=float(np.median(measured)) if measured.size else 1.0,
+
+def whole_registration(database: Database, registration_id: int) -> Registration | None:
+    """A registration with its task, object, scene and frames."""
+    with database.read() as session:
+        return session.scalar(
+            select(Registration)
+            .where(Registration.id == registration_id)
+            .options(
+                joinedload(Registration.task).joinedload(Task.object),
+                joinedload(Registration.task).joinedload(Task.scene).selectinload(Scene.frames),
+                joinedload(Registration.task).joinedload(Task.frame),
+                joinedload(Registration.user),
+            )
         )
 
 
@@ -392,7 +393,8 @@ class _Shown:
         """Draw what changed."""
         if state.frame_id != self._frame_id:
             self._frame_id = state.frame_id
-            self._show_cloud(self._frames[state.frame_id])
+            frame = self._frames[state.frame_id]
+            show_cloud_of(self._view, frame, self._data.cloud(frame))
         if not state.dragging:
             self._view.move_object(state.T_world_object, state.gizmo_axes)
         offer = state.live or state.offer
@@ -410,12 +412,6 @@ class _Shown:
         if state.layers != self._layers:
             self._layers = state.layers
             self._view.show_layers(state.layers)
-
-    def _show_cloud(self, frame: Frame) -> None:
-        cloud = self._data.cloud(frame)
-        distance = np.linalg.norm(cloud.points - np.array(frame.T_world_camera)[:3, 3], axis=1)
-        footprint = float(np.median(distance)) / frame.fx if len(distance) else 0.001
-        self._view.show_cloud(cloud.points, cloud.colors, point_size=footprint)
 
 
 def _same_pose_of(model: ObjectModel) -> SamePose:

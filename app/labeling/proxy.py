@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from collections.abc import Awaitable, Callable
 from typing import Annotated
 from urllib.parse import quote
 
@@ -27,7 +28,11 @@ async def view_page(
     path: str, request: Request, seat: SeatDep, services: Annotated[Services, Depends(get_services)]
 ) -> Response:
     """A file of the view's page."""
-    port = await asyncio.to_thread(services.desk.view_port, seat)
+    return await fetched(request, await asyncio.to_thread(services.desk.view_port, seat), path)
+
+
+async def fetched(request: Request, port: int, path: str) -> Response:
+    """A file of the page of the view on a loopback port."""
     client: httpx.AsyncClient = request.app.state.http
     answer = await client.get(f"http://127.0.0.1:{port}/{quote(path)}")
     return Response(
@@ -50,7 +55,7 @@ async def view_socket(socket: WebSocket, registration_id: Id) -> None:
     port = await asyncio.to_thread(services.desk.view_port, seat)
     leave = services.desk.watch(seat)
     try:
-        await _join(socket, port, seat)
+        await join(socket, port, lambda change: _count(seat, change))
     finally:
         leave()
 
@@ -67,7 +72,20 @@ def _allowed_seat(socket: WebSocket, registration_id: int) -> Seat | None:
         return None
 
 
-async def _join(socket: WebSocket, port: int, seat: Seat) -> None:
+async def _nobody_counts(_change: int) -> None:
+    pass
+
+
+async def join(
+    socket: WebSocket, port: int, count: Callable[[int], Awaitable[None]] = _nobody_counts
+) -> None:
+    """Hand messages to and fro between a page and the view on a loopback port, until either leaves.
+
+    Args:
+        socket: Of the page, not accepted yet.
+        port: Of the view.
+        count: Told +1 when the two are joined, -1 when they are not any more.
+    """
     protocols = [
         websockets.Subprotocol(name)
         for name in socket.scope["subprotocols"]
@@ -77,12 +95,12 @@ async def _join(socket: WebSocket, port: int, seat: Seat) -> None:
         f"ws://127.0.0.1:{port}/", subprotocols=protocols, max_size=None, compression=None
     ) as view:
         await socket.accept(subprotocol=view.subprotocol)
-        await _count(seat, +1)
+        await count(+1)
         tasks = {asyncio.create_task(_to_page(socket, view)), asyncio.create_task(_to_view(socket, view))}
         try:
             _, unfinished = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            await _count(seat, -1)
+            await count(-1)
         for task in unfinished:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from app.auth import Actor
 from app.event_log import STATE_AFTER, NewEvent
+from app.labeling.camera_watch import Camera
 from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
@@ -290,6 +291,12 @@ class LabelingSession:
             self._track.record(NewEvent(kind="frame", actor=actor, detail={"frame_id": frame_id}))
             self._track.frame_id = frame_id
             self._changed()
+
+    def look_from(self, camera: Camera, seconds: float) -> None:
+        """The operator turned the view, within the last `seconds`. Without the lock: no drag waits for it."""
+        if self._is_open:
+            event = NewEvent("view", Actor.HUMAN, duration_seconds=seconds, detail=dict(camera))
+            self._track.record(event)
 
     def submit(self, actor: Actor) -> None:
         """Finish the registration with the present pose."""

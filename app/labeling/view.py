@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from viser import _messages
 
+from app.labeling.camera_watch import Camera, CameraWatch
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.neighbour_view import NeighbourView
@@ -80,6 +81,7 @@ class SceneView:
         self._cloud: viser.PointCloudHandle | None = None
         self._on_object: viser.PointCloudHandle | None = None
         self._layers = Layers()
+        self._watch: CameraWatch | None = None
         self._gizmo, self._mesh = self._add_object(T_world_object)
         self.neighbours = NeighbourView(self._server)
         self._follow_drags(drag)
@@ -161,6 +163,17 @@ class SceneView:
                 client.camera.up_direction = viewpoint.up
                 client.camera.position = viewpoint.position
                 client.camera.look_at = viewpoint.target
+            self._note_camera(client.camera)  # the page tells only of what its user moves
+
+    def watch_camera(self, watch: CameraWatch) -> None:
+        """Let `watch` follow from where the operator looks, from the moment that a page shows the view."""
+        self._watch = watch
+
+        @self._server.on_client_connect
+        async def _(client: viser.ClientHandle) -> None:
+            @client.camera.on_update
+            async def _(camera: viser.CameraHandle) -> None:
+                self._note_camera(camera)
 
     def show_ghost(self, T_world_object: Array | None) -> None:
         """Show where the machine would put the object; None shows nothing."""
@@ -186,7 +199,14 @@ class SceneView:
 
     def close(self) -> None:
         """Stop serving."""
+        if self._watch is not None:
+            self._watch.close()
         self._server.stop()
+
+    def _note_camera(self, camera: viser.CameraHandle) -> None:
+        now = _logged(camera)
+        if now is not None and self._watch is not None:
+            self._watch.moved(now)
 
     def _place_camera(self, view: FirstView) -> None:
         look_at = pose.apply(view.T_world_camera, [0.0, 0.0, view.distance])
@@ -247,6 +267,16 @@ def _refuse_sharing(server: viser.ViserServer) -> None:
     websocket = server._websock_server
     websocket.unregister_handler(_messages.ShareUrlRequest)
     websocket.unregister_handler(_messages.ShareUrlDisconnect)
+
+
+def _logged(camera: viser.CameraHandle) -> Camera | None:
+    """Where viser's camera is, to a tenth of a millimetre; None where a page sent nonsense."""
+    numbers = np.concatenate([camera.position, camera.look_at, camera.up_direction, [camera.fov]]).round(4)
+    across = np.cross(numbers[3:6] - numbers[:3], numbers[6:9])
+    if not np.isfinite(numbers).all() or not across.any():
+        return None
+    rounded = numbers.tolist()
+    return {"position": rounded[:3], "look_at": rounded[3:6], "up": rounded[6:9], "fov": rounded[9]}
 
 
 def _to_viser(T: Array) -> tuple[Array, Array]:

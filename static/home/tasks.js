@@ -54,7 +54,7 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   function append({ items, next: cursor }) {
     next = cursor ?? null;
-    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me))));
+    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me), replayLinks(task, me))));
     byId("more").hidden = next === null;
     setText(byId("tasks-status"), `${count(byId("tasks").childElementCount, "task")} shown`);
   }
@@ -115,6 +115,17 @@ function taskCard(task, me) {
     ),
   );
   return card;
+}
+
+/** Who submitted the task, each name leading to the replay: one's own, or everybody's for a reviewer. */
+function replayLinks({ operators }, me) {
+  const links = operators
+    .filter(({ name, state }) => state === "submitted" && (name === me.name || me.role !== "operator"))
+    .map(({ name, registration_id: id }) => {
+      const shown = name === me.name ? "you" : name;
+      return element("a", { href: `/replay/${id}`, "aria-label": `Replay of ${shown}` }, shown);
+    });
+  return links.length ? element("p", { className: "card-replays" }, icon("play"), "Replay", ...links) : null;
 }
 
 /** "In progress · you, Ada", "Skipped · you (no depth)". */

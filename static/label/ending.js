@@ -37,6 +37,7 @@ export function endingPart(page) {
     if (before?.state === state) return;
     dialog.close();
     page.message.clear();
+    byId("replay").href = `/replay/${page.registration().id}`;
     showNext().catch(page.message.problem);
   }
 

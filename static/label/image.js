@@ -1,6 +1,5 @@
 /** The colour image of the frame, with the outline of the object or its shape on top; zoom; the other frames. */
 
-import { put } from "../api.js";
 import { byId, rgb, setText } from "../dom.js";
 import { depthOf } from "./depth.js";
 import { frameStrip } from "./frames.js";
@@ -53,7 +52,7 @@ export function imagePart(page) {
 
   async function chooseFrame(frame) {
     if (frame === shown || !page.isConnected()) return;
-    await put(page.path("frame"), { frame_id: frame.id }).catch(page.message.problem);
+    await page.showFrame(frame).catch(page.message.problem);
   }
 
   function draw(newest) {
@@ -62,7 +61,7 @@ export function imagePart(page) {
     registration = newest.preview ? asLookedAt(newest, frame) : newest;
     if (shown !== frame) showFrame(frame);
     canvas.dataset.source = newest.preview || newest.confidence !== null ? "machine" : "human";
-    showAgreement(newest.layers.agreement);
+    showAgreement(newest.layers?.agreement);
     drawPose();
   }
 

@@ -8,7 +8,7 @@
  * takes what it shows, likewise.
  */
 
-import { del, get, post } from "../api.js";
+import { del, get, post, put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
@@ -52,6 +52,7 @@ const page = {
   isConnected: () => connected,
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
+  showFrame: (frame) => put(path("frame"), { frame_id: frame.id }),
 };
 const PARTS = [
   endingPart(page),

@@ -95,6 +95,7 @@ def services(state_dir: Path, cluster: str) -> Iterator[Services]:
     opened = create_services(settings_for(state_dir, cluster))
     yield opened
     opened.desk.close()
+    opened.replays.close()
     opened.export_jobs.close()
     opened.snapper.close()
     opened.database.close()

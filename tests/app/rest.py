@@ -19,8 +19,9 @@ def begin(client: httpx.Client, task: int = 0) -> dict[str, Any]:
 
 
 def log_of(client: httpx.Client, registration_id: int) -> list[dict[str, Any]]:
-    """All events of a registration."""
-    return client.get(f"/api/registrations/{registration_id}/events?limit=500").json()["items"]
+    """All events of a registration but those that tell where the camera of its view stands."""
+    events = client.get(f"/api/registrations/{registration_id}/events?limit=500").json()["items"]
+    return [event for event in events if event["kind"] != "view"]
 
 
 def kinds(client: httpx.Client, registration_id: int) -> list[str]:

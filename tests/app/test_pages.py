@@ -61,7 +61,13 @@ def test_strangers_are_sent_to_sign_in_and_back(live: LiveServer, path: str, wan
 
 @pytest.mark.parametrize(
     ("path", "title"),
-    [("/", "Snap6D"), ("/export", "Export"), ("/label/1", "Label"), ("/sign-in", "Sign in")],
+    [
+        ("/", "Snap6D"),
+        ("/export", "Export"),
+        ("/label/1", "Label"),
+        ("/replay/1", "Replay"),
+        ("/sign-in", "Sign in"),
+    ],
 )
 def test_who_is_signed_in_gets_the_page(live: LiveServer, path: str, title: str) -> None:
     answer = live.person("a reader of pages").get(path)

@@ -214,8 +214,11 @@ def test_the_view_follows_the_session_and_the_session_the_view(services, seat):
         client.wait_for("SetPositionMessage", arrived_at(true_pose(TOOL)))
         dragged = true_pose(TOOL) @ T_object_gizmo @ pose.exp([0, 0, 0, 0, 0, 0.4])
         client.drag([dragged])
-        wait_until(lambda: services.log.events(seat.registration.id)[-1].kind == "drag", "the drag")
-        event = services.log.events(seat.registration.id)[-1]
+
+        def drags():
+            return [event for event in services.log.events(seat.registration.id) if event.kind == "drag"]
+
+        (event,) = wait_until(drags, "the drag")
         assert (event.actor, event.dof) == ("human", ["rz"])
         assert np.allclose(event.T_after, dragged @ pose.inverse(T_object_gizmo), atol=1e-9)
         other_frame = max(seat.frames)

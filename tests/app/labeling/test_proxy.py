@@ -29,7 +29,7 @@ class Operator:
     def cookie(self) -> dict[str, str]:
         return {"cookie": f"{SESSION_COOKIE}={self.http.cookies[SESSION_COOKIE]}"}
 
-    def view(self, registration_id: int | None = None, origin: str | None = "own") -> ViserClient:
+    def view(self, registration_id: int | str | None = None, origin: str | None = "own") -> ViserClient:
         """A WebSocket to a view with this user's cookie."""
         url = f"ws://{self.live.host}/view/{registration_id or self.id}/"
         return ViserClient(url, self.cookie, self.live.url if origin == "own" else origin)

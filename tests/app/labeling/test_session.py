@@ -762,3 +762,24 @@ def test_a_listener_may_look_at_the_session(bench):
     bench.session.subscribe(lambda state: seen.append(bench.state == state or bench.state is not None))
     bench.drag(shifted(0.1))
     assert seen and all(seen)
+
+
+def test_where_the_operator_looks_from_is_logged_and_is_no_step() -> None:
+    bench = Bench()
+    camera = {"position": [0.0, 0.0, 1.0], "look_at": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "fov": 0.8}
+    bench.session.start_drag()
+    bench.session.look_from(camera, 0.7)  # even with the object in the hand
+    (event,) = bench.log.events
+    assert (event.kind, event.actor, event.duration_seconds, event.detail) == (
+        "view",
+        Actor.HUMAN,
+        0.7,
+        camera,
+    )
+    assert bench.session.snapshot().dragging and not bench.session.snapshot().can_undo
+
+
+def test_a_submitted_session_logs_no_views() -> None:
+    bench = Bench(state="submitted")
+    bench.session.look_from({"fov": 0.8}, 0.7)
+    assert bench.log.events == []

@@ -23,7 +23,7 @@ def unsure(semi_axes: list[float], *unknown: UnknownMotion) -> Uncertainty:
 @pytest.fixture
 def view() -> Iterator[SceneView]:
     first = FirstView(T_world_camera=NEAR_VIEW, field_of_view=0.8, distance=0.5)
-    hands = DragHandlers(lambda: None, lambda T: None, lambda: None)
+    hands = DragHandlers(lambda: None, lambda T: None, lambda broken: None)
     opened = SceneView(model_of(mesh_of(TOOL)), np.eye(4), first, hands)
     yield opened
     opened.close()

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from app.labeling.camera_watch import CameraWatch
 from app.labeling.layers import Layers
 from app.labeling.view import DragHandlers, FirstView, SceneView
 from registration_core import ObjectModel, pose
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
-from tests.app.labeling.viser_client import ViserClient
+from tests.app.labeling.viser_client import CAMERA, ViserClient
 from tests.app.waiting import wait_until
 
 T_WORLD_OBJECT = pose.exp([0.1, -0.2, 0.3, 0.2, 0.4, -0.3])
@@ -301,3 +302,21 @@ def test_a_place_that_is_no_number_moves_nothing_and_the_drag_still_ends(view, h
         client.let_go()
         hand.wait_for_ends(1)
     assert hand.calls == ["start", "end"]
+
+
+def test_the_camera_is_told_of_when_a_page_comes_and_when_it_is_moved(view):
+    told = []
+    view.watch_camera(CameraWatch(lambda camera, seconds: told.append(camera)))
+    with connect(view) as client:
+        wait_until(lambda: told, "the first view")
+        client.send("ViewerCameraMessage", **CAMERA | {"position": [float("nan")] * 3})
+        client.send("ViewerCameraMessage", **CAMERA | {"up_direction": CAMERA["position"]})  # no up at all
+        client.send("ViewerCameraMessage", **CAMERA | {"position": [0.5, 0.25, 2.00001]})
+        wait_until(lambda: len(told) == 2, "the second view")
+    assert told[0] == {
+        "position": [1.0, 1.0, 1.0],
+        "look_at": [0.0, 0.0, 0.0],
+        "up": [0.0, 0.0, 1.0],
+        "fov": 1.3,
+    }
+    assert told[1] == told[0] | {"position": [0.5, 0.25, 2.0]}

@@ -1,0 +1,1 @@
+"""Registrations played back from their logs."""
