@@ -75,4 +75,4 @@ def open_page(browser: Browser) -> Iterator[Callable[[str], Page]]:
 def take_picture(page: Page, name: str) -> None:
     """Write what the page shows, for people to look at."""
     PICTURES.mkdir(parents=True, exist_ok=True)
-    page.screenshot(path=PICTURES / f"{name}.png")
+    page.screenshot(path=PICTURES / f"{name}.png", timeout=90_000)
