@@ -28,15 +28,20 @@ class Desk:
     """A labelling page and the registration behind it."""
 
     def __init__(
-        self, page: Page, server: Server, object_name: str = "", condition: Condition | None = None
+        self,
+        page: Page,
+        server: Server,
+        object_name: str = "",
+        condition: Condition | None = None,
+        scene_id: int = 1,
     ) -> None:
-        """Open the first task that nobody has, or that of an object in the first demo scene.
+        """Open the first task that nobody has, or that of an object in a demo scene.
 
         With a condition it is a new task under this one, which only an administrator may ask for.
         """
         self.page = page
         page.wait_for_url(f"{server.url}/")
-        wanted = "scene_id=1" if object_name else "state=open"
+        wanted = f"scene_id={scene_id}" if object_name else "state=open"
         tasks = page.request.get(f"{server.url}/api/tasks?{wanted}").json()["items"]
         self.task = next(task for task in tasks if object_name in task["object"]["name"])
         if condition is not None:

@@ -16,13 +16,14 @@ from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-TRUTH = REPOSITORY / "scenes/demo/test/000001"
+SCENES = REPOSITORY / "scenes/demo/test"
 
 
-def true_pose(obj_id: int) -> np.ndarray:
-    """T_world_object of an object in the first demo scene, metres."""
-    camera = json.loads((TRUTH / "scene_camera.json").read_text())["0"]
-    entries = json.loads((TRUTH / "scene_gt.json").read_text())["0"]
+def true_pose(obj_id: int, scene_id: int = 1) -> np.ndarray:
+    """T_world_object of an object in a demo scene, metres."""
+    scene = SCENES / f"{scene_id:06d}"
+    camera = json.loads((scene / "scene_camera.json").read_text())["0"]
+    entries = json.loads((scene / "scene_gt.json").read_text())["0"]
     entry = next(entry for entry in entries if entry["obj_id"] == obj_id)
     T_camera_object = pose.from_rotation_translation(
         np.reshape(entry["cam_R_m2c"], (3, 3)), np.array(entry["cam_t_m2c"]) / 1000
