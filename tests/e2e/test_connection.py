@@ -89,14 +89,3 @@ def test_the_page_goes_on_when_the_network_comes_back(desk: Desk) -> None:
     expect(page.locator("#undo")).to_be_enabled(timeout=SLOWEST)
     assert np.allclose(desk.pose, kept)
     desk.drag("tz", 0.02)
-
-
-def test_a_page_that_slept_looks_whether_its_connection_lives(desk: Desk) -> None:
-    page = desk.page
-    page.clock.install()
-    page.reload()
-    view_frame(page)
-    with page.expect_request("**/stream?page=*", timeout=SLOWEST):
-        page.clock.fast_forward("30:00")
-    expect(page.locator("#connection")).to_be_hidden(timeout=SLOWEST)
-    expect(page.locator("#saved")).to_contain_text("saved", timeout=SLOWEST)
