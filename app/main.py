@@ -9,6 +9,7 @@ from fastapi import FastAPI
 
 from app import __version__, pages
 from app.api import (
+    copies,
     datasets,
     exports,
     health,
@@ -20,6 +21,7 @@ from app.api import (
     sign_in,
     snaps,
     tasks,
+    three_points,
 )
 from app.auth import Auth
 from app.config import Settings
@@ -95,6 +97,8 @@ def create_app(services: Services) -> FastAPI:
         tasks,
         registrations,
         placement,
+        three_points,
+        copies,
         snaps,
         exports,
     ):

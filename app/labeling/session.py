@@ -6,7 +6,7 @@ viser, the web or the workers: the session is handed plain functions.
 
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ParamSpec
 
@@ -161,13 +161,20 @@ class LabelingSession:
             finally:
                 self._changed()
 
-    def set_pose(self, T_world_object: Array, actor: Actor, technique: str | None = None) -> None:
+    def set_pose(
+        self,
+        T_world_object: Array,
+        actor: Actor,
+        technique: str | None = None,
+        detail: Mapping[str, object] | None = None,
+    ) -> None:
         """Put the object at a pose.
 
         Args:
             T_world_object: Where it goes.
             actor: Who moves it.
             technique: How the pose was found, for the log.
+            detail: What the technique found it from, for the log, as JSON.
         """
         with self._lock:
             self._require_free_hands()
@@ -178,7 +185,7 @@ class LabelingSession:
                 T_before=before.tolist(),
                 T_after=T_world_object.tolist(),
                 dof=degrees_of_freedom(before, T_world_object, self._track.pivot),
-                detail={} if technique is None else {"technique": technique},
+                detail=({} if technique is None else {"technique": technique}) | dict(detail or {}),
             )
             self._move(event, Step(T_world_object))
             self._changed()
