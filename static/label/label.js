@@ -10,6 +10,7 @@
 import { del, get, post } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { messageArea } from "../message.js";
+import { copyPart } from "./copy.js";
 import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
@@ -20,6 +21,7 @@ import { drawPanel, isSnapping, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { followRegistration } from "./stream.js";
+import { threePointsPart } from "./three-points.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
 
@@ -38,12 +40,15 @@ const page = {
   isConnected: () => connected,
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
+  leaveMode,
 };
 const PARTS = [
   imagePart(page),
   machinePart(page),
   numbersPart(page),
   placePart(page),
+  threePointsPart(page),
+  copyPart(page),
   precisionPart(page),
   viewsPart(page),
 ];
@@ -182,8 +187,13 @@ function attachToView(viewWindow) {
   for (const part of PARTS) part.attach?.(viewWindow);
 }
 
+/** True if there was a mode to leave. */
+function leaveMode() {
+  return PARTS.some((part) => part.leave?.());
+}
+
 function leaveOrCancel() {
-  if (!PARTS.some((part) => part.leave?.())) act("cancel");
+  if (!leaveMode()) act("cancel");
 }
 
 function submitOrGoOn() {
