@@ -58,7 +58,7 @@ function nameOf({ is_neighbour: isNeighbour, scene, instance, operator }) {
 }
 
 function infoOf({ is_neighbour: isNeighbour, is_mine: isMine, operator, state, confidence }) {
-  const whose = isMine ? "mine" : isNeighbour ? `by ${operator}` : "this frame";
+  const whose = isMine ? "mine" : isNeighbour ? `by ${operator}` : "this task";
   const how = confidence === null ? "posed by hand" : `confidence ${confidence.toFixed(2)}`;
   return [whose, state === "submitted" ? "submitted" : "not submitted yet", how].join(" · ");
 }
