@@ -9,6 +9,7 @@ from fastapi import FastAPI
 
 from app import __version__, pages
 from app.api import (
+    copies,
     datasets,
     exports,
     health,
@@ -23,6 +24,7 @@ from app.api import (
     sign_in,
     snaps,
     tasks,
+    three_points,
     uncertainty,
 )
 from app.auth import Auth
@@ -104,6 +106,8 @@ def create_app(services: Services) -> FastAPI:
         scene_things,
         replay,
         placement,
+        three_points,
+        copies,
         snaps,
         searches,
         uncertainty,

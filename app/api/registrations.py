@@ -200,7 +200,8 @@ def get_registration(seat: SeatDep) -> RegistrationOut:
 def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
     """Put the object at a pose."""
     T_world_object = rigid_pose(body.T_world_object, "T_world_object")
-    seat.session.set_pose(T_world_object, identity.actor, body.technique, body.stems_from)
+    detail = {} if body.stems_from is None else {"stems_from": body.stems_from}
+    seat.session.set_pose(T_world_object, identity.actor, body.technique, detail)
     return registration_out(seat)
 
 

@@ -8,7 +8,7 @@ import secrets
 import threading
 import time
 import uuid
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ParamSpec
 
@@ -213,7 +213,7 @@ class LabelingSession:
         T_world_object: Array,
         actor: Actor,
         technique: str | None = None,
-        stems_from: str | None = None,
+        detail: Mapping[str, object] | None = None,
     ) -> None:
         """Put the object at a pose.
 
@@ -221,19 +221,18 @@ class LabelingSession:
             T_world_object: Where it goes.
             actor: Who moves it.
             technique: How the pose was found, for the log.
-            stems_from: The search or snap that found it, for the log.
+            detail: What the technique found it from, for the log, as JSON.
         """
         with self._lock:
             self._require_free_hands()
             before = self._track.history.current.T_world_object
-            told = {"technique": technique, "stems_from": stems_from}
             event = NewEvent(
                 kind="set_pose",
                 actor=actor,
                 T_before=before.tolist(),
                 T_after=T_world_object.tolist(),
                 dof=degrees_of_freedom(before, T_world_object, self._track.pivot),
-                detail={name: value for name, value in told.items() if value is not None},
+                detail=({} if technique is None else {"technique": technique}) | dict(detail or {}),
             )
             self._move(event, Step(T_world_object))
             self._changed()

@@ -1,7 +1,7 @@
 """The 3-D view of one labelling session: point cloud, mesh and gizmo in viser."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from viser import _messages
 from app.labeling.camera_watch import Camera, CameraWatch
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
+from app.labeling.marks import draw_marks
 from app.labeling.neighbour_view import NeighbourView
 from app.labeling.uncertainty_view import UncertaintyView
 from app.labeling.viewpoint import Viewpoint
@@ -32,6 +33,8 @@ SURFACE_POINT = 0.008
 """Size of such a point as a share of the object's diameter."""
 GIZMO_SIZE = 0.75
 """Length of the gizmo's arms as a share of the object's diameter."""
+MARK_SIZE = 0.02
+"""Radius of a mark as a share of the object's diameter."""
 STEP_BACK = 1.15
 """How much further from the object than the sensor the first view is."""
 FIELD_OF_VIEW_LIMITS = (0.5, 1.3)
@@ -189,6 +192,11 @@ class SceneView:
             self._ghost.position = position
             self._ghost.wxyz = wxyz
             self._ghost.visible = True
+
+    def mark(self, points: Sequence[Array]) -> None:
+        """Number points (3,) of the world, metres, in every page that shows the view now, and no others."""
+        for client in self._server.get_clients().values():
+            draw_marks(client.scene, points, MARK_SIZE * self._model.diameter)
 
     def lock_object(self, locked: bool) -> None:
         """Take the gizmo's handles away, or give them back; the object stays in view."""

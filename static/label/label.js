@@ -14,6 +14,7 @@ import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
 import { candidatesPart } from "./candidates.js";
 import { connectionPart } from "./connection.js";
+import { copyPart } from "./copy.js";
 import { endingPart } from "./ending.js";
 import { findPart } from "./find.js";
 import { guidePart } from "./guide.js";
@@ -30,6 +31,7 @@ import { seeingPart } from "./seeing.js";
 import { signInAgainHere } from "./sign-in-again.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
+import { threePointsPart } from "./three-points.js";
 import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
@@ -53,6 +55,7 @@ const page = {
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
   showFrame: (frame) => put(path("frame"), { frame_id: frame.id }),
+  leaveMode,
 };
 const PARTS = [
   endingPart(page),
@@ -62,6 +65,8 @@ const PARTS = [
   machinePart(page),
   numbersPart(page),
   placePart(page),
+  threePointsPart(page),
+  copyPart(page),
   precisionPart(page),
   thingsPart(page),
   findPart(page),
@@ -209,8 +214,13 @@ function attachToView(viewWindow) {
   for (const part of PARTS) part.attach?.(viewWindow);
 }
 
+/** True if there was a mode to leave. */
+function leaveMode() {
+  return PARTS.some((part) => part.leave?.());
+}
+
 function leaveOrCancel() {
-  if (!PARTS.some((part) => part.leave?.())) act("cancel");
+  if (!leaveMode()) act("cancel");
 }
 
 function accept() {

@@ -55,13 +55,13 @@ export function withNumber(T, name, value) {
   return [0, 1, 2].map((i) => [...rotation[i].slice(0, 3), position[i]]).concat([[0, 0, 0, 1]]);
 }
 
-/** Product of two poses. */
+/** Product of two poses, or of two rotations. */
 export function product(A, B) {
   return A.map((row) => B[0].map((_, j) => row.reduce((sum, value, k) => sum + value * B[k][j], 0)));
 }
 
-/** Rodrigues' formula: the matrix of a rotation vector [rad]. */
-function rotationMatrix(vector) {
+/** Rodrigues' formula: the matrix (3x3) of a rotation vector [rad]. */
+export function rotationMatrix(vector) {
   const angle = Math.hypot(...vector);
   const [x, y, z] = vector.map((component) => component / (angle || 1));
   const [c, s, t] = [Math.cos(angle), Math.sin(angle), 1 - Math.cos(angle)];

@@ -45,6 +45,22 @@ class PreciseDesk(Desk):
         """Pose of the 3-D view's camera in the browser, in three.js' world."""
         return np.array(self.frame.evaluate(CAMERA)).reshape(4, 4).T
 
+    def pixel_of(self, point: np.ndarray) -> tuple[float, float]:
+        """Column and row of a point (3,) of the world in the frame's image."""
+        camera = self.frame_info["intrinsics"]
+        x, y, z = pose.apply(pose.inverse(self.T_world_camera), point)
+        return camera["fx"] * x / z + camera["cx"], camera["fy"] * y / z + camera["cy"]
+
+    def image_place(self, point: np.ndarray) -> tuple[float, float]:
+        """The page's pixel of a point (3,) of the world in the colour image."""
+        box = self.page.locator("#color").bounding_box()
+        assert box is not None
+        column, row = self.pixel_of(point)
+        width, height = self.frame_info["width"], self.frame_info["height"]
+        scale = min(box["width"] / width, box["height"] / height)
+        left, top = (box["width"] - scale * width) / 2, (box["height"] - scale * height) / 2
+        return box["x"] + left + scale * (column + 0.5), box["y"] + top + scale * (row + 0.5)
+
     def moves(self) -> int:
         items = self.page.request.get(f"{self.url}/events?limit=500").json()["items"]
         return sum(event["kind"] == "set_pose" for event in items)
@@ -69,14 +85,14 @@ class PreciseDesk(Desk):
         return self.camera
 
 
-def true_centre(desk: PreciseDesk) -> np.ndarray:
-    """Where the middle of the bottle really is (3,), in the world."""
+def true_pose(desk: PreciseDesk) -> np.ndarray:
+    """Where the bottle really is: T_world_object (4, 4)."""
     entries = json.loads((DEMO / "test/000001/scene_gt.json").read_text())[str(desk.frame_info["image_id"])]
     truth = next(entry for entry in entries if entry["obj_id"] == BOTTLE)
     T_camera_object = pose.from_rotation_translation(
         np.reshape(truth["cam_R_m2c"], (3, 3)), np.array(truth["cam_t_m2c"]) / 1000
     )
-    return pose.apply(desk.T_world_camera @ T_camera_object, MODEL.centre)
+    return desk.T_world_camera @ T_camera_object
 
 
 @pytest.fixture
@@ -263,8 +279,7 @@ def pixel_of_middle(page: Page) -> np.ndarray:
 
 def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
     page = desk.page
-    truth = true_centre(desk)
-    info = desk.frame_info["intrinsics"]
+    truth = pose.apply(true_pose(desk), MODEL.centre)
     T = desk.pose
     page.keyboard.press("p")
     expect(page.locator("#place-mode")).to_be_visible()
@@ -272,14 +287,7 @@ def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
     page.keyboard.press("Escape")
     expect(page.locator("#place-mode")).to_be_hidden()
     page.locator("#place").click()
-    box = page.locator("#color").bounding_box()
-    assert box is not None
-    x, y, z = pose.apply(pose.inverse(desk.T_world_camera), truth)
-    width, height = desk.frame_info["width"], desk.frame_info["height"]
-    scale = min(box["width"] / width, box["height"] / height)
-    column, row = info["fx"] * x / z + info["cx"] + 0.5, info["fy"] * y / z + info["cy"] + 0.5
-    left, top = (box["width"] - scale * width) / 2, (box["height"] - scale * height) / 2
-    at = box["x"] + left + scale * column, box["y"] + top + scale * row
+    at = desk.image_place(truth)
     event = desk.change(lambda: page.mouse.click(*at))
     assert event["detail"] == {"technique": "place"}
     placed = desk.pose

@@ -1,0 +1,82 @@
+"""Copying a pose from another frame of the video, or from another operator."""
+
+from fastapi import APIRouter
+from pydantic import BaseModel, Field
+
+from app.api.dependencies import IdentityDep, ServicesDep
+from app.api.registrations import RegistrationOut, SeatDep, registration_out
+from app.auth import Identity
+from app.labeling.copying import Copy, copies_for
+from app.labeling.desk import NotFoundError, Seat
+from app.services import Services
+from app.tables import Pose
+
+router = APIRouter(prefix="/api/registrations", tags=["copies"])
+
+
+class CopyOut(BaseModel):
+    """A pose that can be copied."""
+
+    registration_id: int = Field(description="Whose pose it is.")
+    operator: str
+    is_mine: bool
+    state: str
+    is_neighbour: bool = Field(description="Another frame's, in the axes of the camera; or else this task's.")
+    scene: str
+    instance: int
+    confidence: float | None
+    T_world_object: Pose = Field(description="In the world that it is copied into.")
+    thumbnail_url: str
+
+
+class Copies(BaseModel):
+    """What can be copied."""
+
+    items: list[CopyOut]
+
+
+class CopyChoice(BaseModel):
+    """Whose pose is to be copied."""
+
+    registration_id: int = Field(ge=1, le=2**31 - 1)
+
+
+@router.get("/{registration_id}/copies")
+def list_copies(seat: SeatDep, services: ServicesDep, identity: IdentityDep) -> Copies:
+    """Poses that can be copied: of other operators, then of the neighbouring frames, nearest first."""
+    found = _copies(seat, services, identity)
+    return Copies(items=[_copy_out(copy, identity) for copy in found.values()])
+
+
+@router.post("/{registration_id}/copy")
+def copy_pose(
+    body: CopyChoice, seat: SeatDep, services: ServicesDep, identity: IdentityDep
+) -> RegistrationOut:
+    """Put the object where another registration has it."""
+    copy = _copies(seat, services, identity).get(body.registration_id)
+    if copy is None:
+        raise NotFoundError(f"There is no pose of a registration {body.registration_id} to copy here.")
+    detail = {"registration_id": copy.source.id, "user_id": copy.source.user_id}
+    seat.session.set_pose(copy.T_world_object, identity.actor, "copy", {"source": detail})
+    return registration_out(seat)
+
+
+def _copies(seat: Seat, services: Services, identity: Identity) -> dict[int, Copy]:
+    found = copies_for(seat.registration, identity, services.database, services.log)
+    return {copy.source.id: copy for copy in found}
+
+
+def _copy_out(copy: Copy, identity: Identity) -> CopyOut:
+    source = copy.source
+    return CopyOut(
+        registration_id=source.id,
+        operator=source.user.name,
+        is_mine=source.user_id == identity.user_id,
+        state=source.state,
+        is_neighbour=copy.is_neighbour,
+        scene=source.task.scene.label,
+        instance=source.task.instance,
+        confidence=copy.confidence,
+        T_world_object=copy.T_world_object.tolist(),
+        thumbnail_url=f"/api/tasks/{source.task_id}/thumbnail.jpg",
+    )

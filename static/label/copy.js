@@ -1,0 +1,64 @@
+/** Copying a pose from a neighbouring frame of the video, or from another operator. */
+
+import { get, post } from "../api.js";
+import { byId, element, picture } from "../dom.js";
+
+/** A part of the labelling page. */
+export function copyPart(page) {
+  const button = byId("copy");
+  const dialog = byId("copies");
+  const list = byId("copy-list");
+
+  button.addEventListener("click", show);
+  list.addEventListener("keydown", (event) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const buttons = [...list.querySelectorAll("button")];
+    buttons[buttons.indexOf(document.activeElement) + step]?.focus();
+  });
+
+  async function show() {
+    if (!page.canMove()) return;
+    page.message.clear();
+    try {
+      const { items } = await get(page.path("copies"));
+      list.replaceChildren(...items.map(row));
+      byId("copies-none").hidden = items.length > 0;
+      if (!dialog.open) dialog.showModal();
+      list.querySelector("button")?.focus();
+    } catch (error) {
+      page.message.problem(error);
+    }
+  }
+
+  function row(item) {
+    const text = element("span", { className: "copy-text" }, element("strong", {}, nameOf(item)), infoOf(item));
+    const choice = element("button", { type: "button" }, picture(item.thumbnail_url, "copy-picture"), text);
+    choice.addEventListener("click", () => copy(item));
+    return element("li", {}, choice);
+  }
+
+  async function copy({ registration_id }) {
+    dialog.close();
+    await post(page.path("copy"), { registration_id }).catch(page.message.problem);
+  }
+
+  function draw() {
+    button.disabled = !page.canMove();
+  }
+
+  const bindings = [{ keys: ["C"], does: "Copy the pose from another frame or operator", run: show }];
+  return { title: "The object", bindings, draw };
+}
+
+function nameOf({ is_neighbour: isNeighbour, scene, instance, operator }) {
+  if (!isNeighbour) return operator;
+  return instance > 0 ? `${scene}, no. ${instance + 1}` : scene;
+}
+
+function infoOf({ is_neighbour: isNeighbour, is_mine: isMine, operator, state, confidence }) {
+  const whose = isMine ? "mine" : isNeighbour ? `by ${operator}` : "this task";
+  const how = confidence === null ? "posed by hand" : `confidence ${confidence.toFixed(2)}`;
+  return [whose, state === "submitted" ? "submitted" : "not submitted yet", how].join(" · ");
+}
