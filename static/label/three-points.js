@@ -21,6 +21,7 @@ export function threePointsPart(page) {
   let view = null;
   let frames = [];
   let meshUrl = null;
+  let marking = Promise.resolve();
   let fitting = Promise.resolve();
 
   button.addEventListener("click", () => use(!on));
@@ -135,7 +136,12 @@ export function threePointsPart(page) {
   function changed() {
     drawPairs();
     markObject();
-    if (page.isConnected()) put(page.path("marks"), { points_world: picked.scene }).catch(page.message.problem);
+    marking = marking.then(markScene);
+  }
+
+  /** One at a time, like fits: marks that were taken back must not come last. */
+  async function markScene() {
+    if (page.isConnected()) await put(page.path("marks"), { points_world: picked.scene }).catch(page.message.problem);
   }
 
   function drawPairs() {
