@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from app.scene_data import camera_of
 from benchmarks.hand import CLICK, CLOSE, DECIDE, KEY, next_stroke
-from benchmarks.operators import Operator, Stream
+from benchmarks.operators import ENDED, Operator, Stream
 from benchmarks.registration.judging import Judge
 from benchmarks.scenes import KnownTask
 from benchmarks.viser_client import Array, ViewClient
 from registration_core import ObjectModel, pose
+from registration_core.camera import depth_to_points, project
+from registration_core.rasterizer import render_depth
 
 NEAR = np.array([0.08, np.radians(40.0)])
 """Metres and radians from which an operator trusts a snap to do the rest."""
@@ -20,6 +23,8 @@ MOST_ACTIONS = 60
 """After which an operator gives up."""
 SECONDS_TO_LOOK = 1.0
 """For how long an operator looks for a ghost after letting go."""
+SHOWN = 0.006
+"""Metres between surface and measurement where the surface is seen."""
 POINTING = 0.004
 """Standard deviation of where a click goes, metres on the object."""
 
@@ -108,6 +113,10 @@ class Alignment:
         """Whether a snap from there is worth trying."""
         return self._is_within(T_world_object, NEAR)
 
+    def misses(self, point: Array) -> Array:
+        """Where a click goes that means this point (3,)."""
+        return point + POINTING * self.rng.normal(size=3)
+
     def _took(self, actions: int, seconds: float) -> None:
         self.actions += actions
         self.seconds += seconds
@@ -154,15 +163,80 @@ async def by_live_snap(work: Alignment) -> None:
             await work.press(lambda: work.post("accept"))
 
 
+async def by_three_points(work: Alignment) -> None:
+    """A key and three pairs of clicks, after which the machine snaps; then as with the gizmo."""
+    T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
+    shown = visible_points(work.task, T_camera_object)
+    pairs = []
+    for on_object in _far_apart(shown, 3):
+        in_scene = clicked_pixel(work.task, T_camera_object, work.misses(on_object))
+        pairs.append({"on_object": work.misses(on_object).tolist(), "in_scene": in_scene})
+    await work.press(_nothing)
+    for _ in range(2 * len(pairs) - 1):
+        await work.click(_nothing)
+
+    async def finish() -> None:
+        answer = await work.post("three-points", {"pairs": pairs})
+        await work.stream.until_snap_ended(answer["snap_id"])
+
+    await work.click(finish)
+    if not work.is_aligned(await work.pose()):
+        await by_gizmo_and_snap(work)
+
+
+async def by_finding(work: Alignment) -> None:
+    """The key that looks for the object, the picture that is right, and a snap; then as with the gizmo."""
+
+    async def find() -> Any:
+        search_id = (await work.post("searches", {}))["id"]
+        await work.stream.until(lambda now: now["search"] is not None and now["search"]["state"] in ENDED)
+        return (await work.operator.call("GET", f"/api/searches/{search_id}"))["candidates"]
+
+    T_world_camera = np.array(work.task.frame.T_world_camera)
+    found = [T_world_camera @ np.array(one["T_camera_object"]) for one in await work.press(find)]
+    right = [T for T in found if work.judge.error(T, work.task.T_world_object).is_right]
+    for T in right[:1]:
+        await work.click(lambda: work.operator.set_pose(work.registration_id, T))  # noqa: B023 - awaited here
+        if not work.is_aligned(T):
+            await work.snap()
+    await by_gizmo_and_snap(work)
+
+
 async def by_click_and_snap(work: Alignment) -> None:
     """A double click on the object in the image, and a snap; then as with the gizmo."""
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
-    x, y, z = pose.apply(T_camera_object, work.model.centre) + POINTING * work.rng.normal(size=3)
-    frame = work.task.frame
-    pixel = {"column": frame.cx + frame.fx * x / z, "row": frame.cy + frame.fy * y / z}
-    await work.click(lambda: work.post("place", {"frame_id": frame.id, **pixel}))
+    pixel = clicked_pixel(work.task, T_camera_object, work.misses(work.task.model.centre))
+    await work.click(lambda: work.post("place", pixel))
     if not work.is_aligned(await work.snap()):
         await by_gizmo_and_snap(work)
+
+
+async def _nothing() -> None:
+    """What a key or click does that only prepares the next one."""
+
+
+def clicked_pixel(task: KnownTask, T_camera_object: Array, point: Array) -> dict[str, float]:
+    """A click in the image at a point (3,) in the object's frame, as REST takes it."""
+    frame = task.frame
+    column, row = project(pose.apply(T_camera_object, point), camera_of(frame))
+    return {"frame_id": frame.id, "column": float(column), "row": float(row)}
+
+
+def visible_points(task: KnownTask, T_camera_object: Array) -> Array:
+    """Points (N, 3) of the object's surface, in its frame, that the depth image shows."""
+    camera = camera_of(task.frame)
+    rendered = render_depth(task.model, camera, T_camera_object)
+    shown = (rendered > 0) & (np.abs(rendered - task.depth) < SHOWN)
+    return pose.apply(pose.inverse(T_camera_object), depth_to_points(rendered, camera)[shown])
+
+
+def _far_apart(points: Array, count: int) -> Array:
+    """Some of the points (N, 3), each as far as can be from those before."""
+    chosen = [points[np.linalg.norm(points - points.mean(axis=0), axis=1).argmax()]]
+    while len(chosen) < count:
+        distance = np.min([np.linalg.norm(points - one, axis=1) for one in chosen], axis=0)
+        chosen.append(points[distance.argmax()])
+    return np.array(chosen)
 
 
 TECHNIQUES: Mapping[str, Callable[[Alignment], Awaitable[None]]] = {
@@ -170,4 +244,6 @@ TECHNIQUES: Mapping[str, Callable[[Alignment], Awaitable[None]]] = {
     "gizmo and snap": by_gizmo_and_snap,
     "live snap": by_live_snap,
     "click-to-place and snap": by_click_and_snap,
+    "three points": by_three_points,
+    "find it": by_finding,
 }

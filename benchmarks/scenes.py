@@ -37,6 +37,8 @@ class KnownTask:
     obj_id: int
     model: ObjectModel
     frame: Frame
+    depth: NDArray[np.float32]
+    """(H, W), metres."""
     T_world_object: Array
     """(4, 4), the truth."""
 
@@ -63,6 +65,7 @@ def known_tasks(state_dir: Path) -> list[KnownTask]:
                 obj_id=row.object.obj_id,
                 model=data.model(row.object),
                 frame=row.frame,
+                depth=data.depth(row.frame),
                 T_world_object=np.array(row.T_world_object_reference),
             )
             for row in rows

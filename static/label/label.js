@@ -94,6 +94,7 @@ const BINDINGS = [
   ...grouped("The task", [
     { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
     { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
+    { keys: ["Shift+R"], does: "Back to the start pose", run: () => act("reset") },
     { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
     { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
     { keys: ["?"], does: "Show these keys", run: () => openHelp() },

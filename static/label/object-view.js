@@ -1,6 +1,6 @@
 /** The object alone, to be turned by a drag and pointed at by a click. */
 
-import { meshDrawing } from "./outline.js";
+import { rgb } from "../dom.js";
 import { distance, LARGEST_CLICK } from "./pointing.js";
 import { product, rotationMatrix } from "./pose.js";
 import { firstHit } from "./ray.js";
@@ -14,12 +14,11 @@ const ZOOM = 1.5; // for a hundred units of the wheel
 const HIDDEN = 0.01; // in radii: a point so much behind the surface is not seen
 
 /**
- * Shows a mesh in `canvas`; `onPoint(point)` gets what is clicked, metres, in the object's frame, and `onTurn` is
- * told when the view has changed. Returns null where the browser has no WebGL 2.
+ * Shows the page's object (`sharedDrawing`) in `canvas`; `onPoint(point)` gets what is clicked, metres, in the
+ * object's frame, and `onTurn` is told when the view has changed. Returns null where the browser has no WebGL 2.
  */
-export function objectView(canvas, mesh, { onPoint, onTurn }) {
-  const drawMesh = meshDrawing(mesh);
-  if (!drawMesh) return null;
+export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
+  if (!drawOn) return null;
   const { middle, radius } = sphereAround(mesh.vertices);
   let rotation = null; // of the object in the view's axes, 3x3
   let zoom = 1;
@@ -73,9 +72,8 @@ export function objectView(canvas, mesh, { onPoint, onTurn }) {
     const unit = Math.min(devicePixelRatio, 2);
     canvas.width = Math.round(canvas.clientWidth * unit);
     canvas.height = Math.round(canvas.clientHeight * unit);
-    const [red, green, blue] = getComputedStyle(canvas).color.match(/[\d.]+/g);
-    const color = [red / 255, green / 255, blue / 255];
-    drawMesh(canvas, { camera: cameraFor(unit), T: poseInView(), color, blend: 1, unit });
+    const color = rgb(getComputedStyle(canvas).color);
+    drawOn(canvas, { camera: cameraFor(unit), T: poseInView(), color, blend: 1, unit });
     onTurn();
   }
 

@@ -4,7 +4,7 @@ import { post, put } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
 import { drawMarks } from "./marks.js";
 import { objectView } from "./object-view.js";
-import { loadMesh } from "./outline.js";
+import { sharedDrawing } from "./outline.js";
 import { placeOfPixel, scenePointing } from "./pointing.js";
 import { relativeTo } from "./pose.js";
 
@@ -48,8 +48,8 @@ export function threePointsPart(page) {
   }
 
   async function showObject() {
-    const mesh = view ? null : await loadMesh(meshUrl); // who opens it twice meanwhile gets one view all the same
-    view ??= objectView(byId("pairs-object"), mesh, { onPoint: pickOnObject, onTurn: markObject });
+    const drawing = await sharedDrawing(meshUrl); // who opens it twice meanwhile gets one view all the same
+    view ??= objectView(byId("pairs-object"), drawing, { onPoint: pickOnObject, onTurn: markObject });
     if (view === null) throw new Error("Without WebGL 2 the object cannot be shown: no points can be clicked on it.");
     if (!on) return;
     byId("pairs").hidden = false;

@@ -54,7 +54,7 @@ def test_it_finds_what_the_library_finds(client, addresses, model, config):
 
 def test_it_passes_by_what_it_is_told_of(client, addresses, model):
     job = new_job(model, explained=np.ones(DEPTH.shape, dtype=np.bool_))
-    result = run(client, addresses[0], worker.run_snap, job, model)
+    result = run(client, addresses[0], worker.run_job, job, model)
     assert np.allclose(result.estimate.T_camera_object, job.T_camera_object)
     assert not result.estimate.converged
 

@@ -85,7 +85,7 @@ def test_taking_a_candidate_is_logged_with_where_it_stems_from_and_undone(bench)
     bench.searchers.searches[0].end(FOUND)
     bench.session.preview(shifted(0.1))
     assert np.array_equal(bench.state.preview, shifted(0.1))
-    bench.session.set_pose(shifted(0.1), Actor.HUMAN, "proposal", search_id)
+    bench.session.set_pose(shifted(0.1), Actor.HUMAN, "proposal", {"stems_from": search_id})
     assert bench.log.events[-1].detail == {"technique": "proposal", "stems_from": search_id}
     assert bench.state.search is None and bench.state.preview is None
     bench.session.undo(Actor.HUMAN)
