@@ -10,6 +10,8 @@ from tests.processes import Server
 pytestmark = pytest.mark.e2e
 
 SLOWEST = 60_000
+OUTLINE_DRAWN = "() => document.getElementById('outline').width !== 300"
+"""A canvas has this width until something is drawn on it."""
 
 
 def test_a_new_operator_is_shown_around_once(server: Server, browser: Browser) -> None:
@@ -37,6 +39,7 @@ def test_a_new_operator_is_shown_around_once(server: Server, browser: Browser) -
     page.reload()  # it is remembered how far they were
     expect(text).to_contain_text("the outline follows the edge", timeout=SLOWEST)
     expect(page.locator("#undo")).to_be_enabled(timeout=SLOWEST)
+    page.wait_for_function(OUTLINE_DRAWN)
     page.keyboard.press("z")
     expect(text).to_contain_text("can be undone")
     page.keyboard.press("Control+z")
