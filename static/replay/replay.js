@@ -89,7 +89,7 @@ function setUpControls(trace, events, viewUrl) {
     ...image.bindings.filter(({ keys }) => keys.every((key) => key !== "," && key !== ".")),
     { keys: ["?"], does: "Show these keys", run: () => openHelp() },
   ];
-  const openHelp = setUpHelp(bindings);
+  const openHelp = setUpHelp(bindings.map((binding) => ({ group: "Replay", ...binding })));
   const attachKeys = keyBindings(bindings);
   attachKeys(window);
   releaseFocusAfterPointer(document);
