@@ -127,6 +127,7 @@ def test_keys_undo_redo_reset_and_reload(desk: Desk) -> None:
     page.keyboard.press("Control+z")  # the focus is in the 3-D view after a drag
     desk.events("undo")
     assert np.allclose(desk.pose, start)
+    expect(page.locator("#redo")).to_be_enabled()  # the page hears of it after the log
     page.keyboard.press("Control+Shift+z")
     desk.events("redo")
     assert np.allclose(desk.pose, moved)
