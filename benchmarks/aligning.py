@@ -5,7 +5,9 @@ from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import httpx
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 from app.scene_data import camera_of
 from benchmarks.hand import CLICK, CLOSE, DECIDE, KEY, next_stroke
@@ -25,6 +27,8 @@ SECONDS_TO_LOOK = 1.0
 """For how long an operator looks for a ghost after letting go."""
 SHOWN = 0.006
 """Metres between surface and measurement where the surface is seen."""
+FROM_EDGE = 5
+"""Pixels that a person keeps from the edge of what is clicked."""
 POINTING = 0.004
 """Standard deviation of where a click goes, metres on the object."""
 
@@ -164,24 +168,40 @@ async def by_live_snap(work: Alignment) -> None:
 
 
 async def by_three_points(work: Alignment) -> None:
-    """A key and three pairs of clicks, after which the machine snaps; then as with the gizmo."""
+    """A key and three pairs of clicks, after which the machine snaps; then as with the gizmo.
+
+    Pairs that do not fit together are refused, and clicked again.
+    """
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
-    shown = visible_points(work.task, T_camera_object)
+    points = _far_apart(visible_points(work.task, T_camera_object), 3)
+    await work.press(_nothing)
+    is_placed = False
+    while not is_placed and work.actions < MOST_ACTIONS:
+        is_placed = await _click_pairs(work, T_camera_object, points)
+    if not work.is_aligned(await work.pose()):
+        await by_gizmo_and_snap(work)
+
+
+async def _click_pairs(work: Alignment, T_camera_object: Array, points: Array) -> bool:
+    """Click points (N, 3) of the object and of the scene; tells whether the pairs were taken."""
     pairs = []
-    for on_object in _far_apart(shown, 3):
+    for on_object in points:
         in_scene = clicked_pixel(work.task, T_camera_object, work.misses(on_object))
         pairs.append({"on_object": work.misses(on_object).tolist(), "in_scene": in_scene})
-    await work.press(_nothing)
     for _ in range(2 * len(pairs) - 1):
         await work.click(_nothing)
 
-    async def finish() -> None:
-        answer = await work.post("three-points", {"pairs": pairs})
+    async def finish() -> bool:
+        try:
+            answer = await work.post("three-points", {"pairs": pairs})
+        except httpx.HTTPStatusError as refusal:
+            if refusal.response.status_code != httpx.codes.UNPROCESSABLE_ENTITY:
+                raise
+            return False
         await work.stream.until_snap_ended(answer["snap_id"])
+        return True
 
-    await work.click(finish)
-    if not work.is_aligned(await work.pose()):
-        await by_gizmo_and_snap(work)
+    return bool(await work.click(finish))
 
 
 async def by_finding(work: Alignment) -> None:
@@ -223,10 +243,12 @@ def clicked_pixel(task: KnownTask, T_camera_object: Array, point: Array) -> dict
 
 
 def visible_points(task: KnownTask, T_camera_object: Array) -> Array:
-    """Points (N, 3) of the object's surface, in its frame, that the depth image shows."""
+    """Points (N, 3) of the surface, in the object's frame, that the depth image shows, away from its edges."""
     camera = camera_of(task.frame)
     rendered = render_depth(task.model, camera, T_camera_object)
     shown = (rendered > 0) & (np.abs(rendered - task.depth) < SHOWN)
+    inner = binary_erosion(shown, iterations=FROM_EDGE)
+    shown = inner if inner.any() else shown
     return pose.apply(pose.inverse(T_camera_object), depth_to_points(rendered, camera)[shown])
 
 
