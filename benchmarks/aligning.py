@@ -243,7 +243,7 @@ def clicked_pixel(task: KnownTask, T_camera_object: Array, point: Array) -> dict
 
 
 def visible_points(task: KnownTask, T_camera_object: Array) -> Array:
-    """Points (N, 3) of the surface, in the object's frame, that the depth image shows, away from its edges."""
+    """Points (N, 3) of the surface, in the object's frame, that the image shows, away from edges."""
     camera = camera_of(task.frame)
     rendered = render_depth(task.model, camera, T_camera_object)
     shown = (rendered > 0) & (np.abs(rendered - task.depth) < SHOWN)
