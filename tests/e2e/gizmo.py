@@ -24,6 +24,13 @@ PIXEL = """([name, local]) => {
   return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
 }"""
 
+NEXT_PICTURE = """() => new Promise(done => {
+  let left = 3;
+  const wait = () => (left-- ? requestAnimationFrame(wait) : done());
+  wait();
+})"""
+"""Resolves when the 3-D view has drawn what it knows."""
+
 STANDS_STILL = """() => new Promise(done => {
   let still = 0, last = "";
   const timer = setInterval(() => {
@@ -108,7 +115,7 @@ def drag(page: Page, frame: Frame, handle: Handle, amount: float, steps: int = 6
     end = pixel(page, frame, handle.moved_grip(amount))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
     page.mouse.down()
     for step in range(1, steps + 1):
         page.mouse.move(*(start + (end - start) * step / steps))

@@ -51,6 +51,7 @@ def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Calla
     expect(page.locator("#candidates")).to_be_hidden()
     truth = true_pose(desk.task["object"]["obj_id"])
     assert pose.distance(desk.pose, truth).translation < 0.01
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.allclose(desk.pose, start)
@@ -102,6 +103,7 @@ def test_modes_and_what_depth_cannot_tell_are_shown(server: Server, open_page: C
     assert taken["detail"] == {"technique": "mode", "stems_from": applied["snap_id"]}
     expect(page.locator("#candidates")).to_be_hidden()
     expect(page.locator("#uncertainty")).to_be_hidden()
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.allclose(desk.pose, applied["T_after"])

@@ -164,7 +164,7 @@ def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
     page.mouse.down()
     for share in (0.3, 0.6, 1.0):
         page.mouse.move(*(start + share * (end - start)))

@@ -67,7 +67,7 @@ def hold(desk: Desk, handle: str, amount: float) -> None:
     end = pixel(desk.page, desk.frame, held.moved_grip(amount))
     desk.page.mouse.move(*(start - 2))
     desk.page.mouse.move(*start)
-    desk.page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
     desk.page.mouse.down()
     for step in range(1, 7):
         desk.page.mouse.move(*(start + (end - start) * step / 6))
@@ -88,6 +88,7 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) ->
     expect(page.locator("#note")).to_contain_text(said)
     expect(page.locator("#note-undo")).to_have_text("Undo Ctrl Z")
     take_picture(page, "label-taken-over")
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.allclose(desk.pose, drag["T_after"])

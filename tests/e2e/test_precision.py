@@ -127,6 +127,7 @@ def test_keys_nudge_in_three_steps_and_three_frames(desk: PreciseDesk) -> None:
     turned = desk.press("Shift+o")
     assert motion(turned)[1] == pytest.approx(pose.exp([0, 0, 0, 0, 0, np.radians(2)])[:3, :3])
     assert np.allclose(desk.press("Shift+u")["T_after"], turned["T_before"])
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.allclose(desk.pose, turned["T_after"])
@@ -166,6 +167,7 @@ def test_quarter_turns_and_flips_keep_the_middle(desk: PreciseDesk) -> None:
     page.locator("#precision summary").click()
     by_button = desk.change(lambda: page.get_by_role("button", name="Turn by 90 degrees about z").click())
     assert by_button["dof"] == ["rz"]
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     flipped = desk.change(lambda: page.get_by_role("button", name="Flip about y").click())
@@ -252,7 +254,7 @@ def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None
     start = pixel(page, desk.frame, np.array([0.9 * size, 0, 0]))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
     page.mouse.down()
     page.mouse.move(*(start + 4))
     page.mouse.move(*(start + 8))
@@ -291,6 +293,7 @@ def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
     event = desk.change(lambda: page.mouse.click(*at))
     assert event["detail"] == {"technique": "place"}
     placed = desk.pose
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.array(desk.change(lambda: page.mouse.dblclick(*at))["T_after"]) == near(placed)
@@ -312,6 +315,7 @@ def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: Prec
     where = np.array([stage["x"] + 0.42 * stage["width"], stage["y"] + 0.55 * stage["height"]])
     event = desk.change(lambda: page.mouse.click(*where))
     assert event["detail"] == {"technique": "place"}
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.array(desk.change(lambda: page.mouse.dblclick(*where))["T_after"]) == near(event["T_after"])

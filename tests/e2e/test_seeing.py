@@ -55,7 +55,7 @@ def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
     start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    page.wait_for_timeout(100)  # the page looks for what is under the pointer once a picture
+    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
     page.mouse.down()
     wait_until(lambda: desk.state["dragging"], "the drag")
     before, began = page.evaluate("redraws"), time.monotonic()

@@ -36,6 +36,7 @@ def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Calla
     dialog = page.locator("#sign-in-again")
     desk.drag("tx", 0.02)
     end_login(desk)
+    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     expect(dialog).to_be_visible()
     expect(dialog.get_by_label("Name")).to_have_value("expired")
@@ -63,6 +64,7 @@ def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Calla
     assert np.allclose(desk.pose, start)
 
     end_login(desk)
+    expect(page.locator("#redo")).to_be_enabled()
     page.keyboard.press("Control+Shift+z")
     dialog.get_by_label("Password").fill(PASSWORD)
     page.keyboard.press("Enter")
