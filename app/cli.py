@@ -154,7 +154,7 @@ def add_user(
 ) -> None:
     """Add a person, and print a one-time link to sign in with."""
     from app.auth import Auth
-    from app.server import sign_in_link
+    from app.listening import sign_in_link
 
     settings = _settings()
     auth = Auth(_checked_database(settings))
@@ -168,7 +168,7 @@ def add_user(
 def link_user(name: str) -> None:
     """Print a one-time link for a person who is there already."""
     from app.auth import Auth
-    from app.server import sign_in_link
+    from app.listening import sign_in_link
 
     settings = _settings()
     auth = Auth(_checked_database(settings))

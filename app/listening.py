@@ -1,4 +1,4 @@
-"""The one public port."""
+"""The one public port and its address."""
 
 import socket
 
@@ -28,3 +28,11 @@ def listen(settings: Settings) -> socket.socket:
             " stop what uses it, or choose another with --port"
         ) from error
     return listener
+
+
+def sign_in_link(settings: Settings, port: int, secret: str) -> str:
+    """Address that signs in, once; the secret stays behind the # and so out of every server's log."""
+    host = "localhost" if settings.host in {"127.0.0.1", "0.0.0.0", "::", "localhost"} else settings.host
+    named = f"[{host}]" if ":" in host else host  # an IPv6 address
+    base = settings.public_url.rstrip("/") or f"http://{named}:{port}"
+    return f"{base}/sign-in#{secret}"

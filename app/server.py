@@ -12,7 +12,7 @@ from app.auth import Role
 from app.config import PROJECT, Settings
 from app.database import Database
 from app.importing import import_dataset
-from app.listening import ServeError
+from app.listening import ServeError, sign_in_link
 from app.main import create_app, create_services
 from app.memory import keep_large_blocks_apart
 from app.services import Services
@@ -86,14 +86,6 @@ def prepare_state(settings: Settings, say: Callable[[str], None]) -> None:
             say(f"Imported the demo scenes: {summary.tasks} tasks.")
     finally:
         database.close()
-
-
-def sign_in_link(settings: Settings, port: int, secret: str) -> str:
-    """Address that signs in, once; the secret stays behind the # and so out of every server's log."""
-    host = "localhost" if settings.host in {"127.0.0.1", "0.0.0.0", "::", "localhost"} else settings.host
-    named = f"[{host}]" if ":" in host else host  # an IPv6 address
-    base = settings.public_url.rstrip("/") or f"http://{named}:{port}"
-    return f"{base}/sign-in#{secret}"
 
 
 class _AnnouncingServer(uvicorn.Server):

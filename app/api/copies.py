@@ -3,8 +3,8 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import IdentityDep, ServicesDep
-from app.api.registrations import RegistrationOut, SeatDep, registration_out
+from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
+from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Identity
 from app.labeling.copying import Copy, copies_for
 from app.labeling.desk import NotFoundError, Seat

@@ -15,6 +15,7 @@ from starlette.requests import HTTPConnection
 
 from app.api.problems import InputError
 from app.auth import Identity, Role
+from app.labeling.desk import Seat
 from app.services import Services
 from app.tables import Pose
 from registration_core import pose
@@ -22,6 +23,8 @@ from registration_core import pose
 SESSION_COOKIE = "snap6d_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 LARGEST_PAGE = 500
+EXAMPLE_POSE = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]
+"""For the interface's description."""
 LARGEST_COORDINATE = 1e8
 """Metres; what is computed from a pose farther away overflows."""
 
@@ -134,3 +137,11 @@ Id = Annotated[int, Path(ge=1, le=2**31 - 1)]
 """Of a row, in a path."""
 QueryId = Annotated[int | None, Query(ge=1, le=2**31 - 1)]
 """Of a row, as a filter of a list."""
+
+
+def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> Seat:
+    """The caller's own live session."""
+    return services.desk.seat(registration_id, identity)
+
+
+SeatDep = Annotated[Seat, Depends(my_seat)]

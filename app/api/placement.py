@@ -7,9 +7,9 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import IdentityDep, ServicesDep
+from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, frame_of, points_of, target_of, viewpoint_of
-from app.api.registrations import RegistrationOut, SeatDep, registration_out
+from app.api.registration_state import RegistrationOut, registration_out
 from app.labeling import placement, viewpoint
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat

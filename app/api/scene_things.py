@@ -3,8 +3,7 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import Page
-from app.api.registrations import SeatDep
+from app.api.dependencies import Page, SeatDep
 from app.labeling.scene_things import Thing
 from app.tables import Pose
 

@@ -5,9 +5,9 @@ from typing import Annotated, Any, cast
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import IdentityDep, ServicesDep, rigid_pose
+from app.api.dependencies import EXAMPLE_POSE, IdentityDep, SeatDep, ServicesDep, rigid_pose
 from app.api.problems import InputError
-from app.api.registrations import EXAMPLE_POSE, RegistrationOut, SeatDep, registration_out
+from app.api.registration_state import RegistrationOut, registration_out
 from app.api.snaps import INTERRUPTED, HypothesisOut, SnapState
 from app.auth import Identity
 from app.scene_data import camera_of

@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal, cast
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import IdentityDep, ServicesDep
+from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
 from app.api.problems import InputError
-from app.api.registrations import SeatDep
 from app.auth import Identity
 from app.labeling.start_spread import Unsaid
 from app.services import Services

@@ -20,7 +20,7 @@ from app.api.dependencies import (
     page_of,
 )
 from app.api.problems import InputError
-from app.api.registrations import RegistrationOut, registration_out
+from app.api.registration_state import RegistrationOut, registration_out
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose

@@ -7,10 +7,10 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import IdentityDep, ServicesDep
+from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, target_of, viewpoint_of
 from app.api.problems import InputError
-from app.api.registrations import RegistrationOut, SeatDep, registration_out
+from app.api.registration_state import RegistrationOut, registration_out
 from app.labeling.desk import Seat
 from app.scene_data import SceneData
 from registration_core.correspondence import Correspondence, pose_from_correspondences

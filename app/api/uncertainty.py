@@ -5,8 +5,7 @@ from typing import Literal
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import ServicesDep
-from app.api.registrations import SeatDep
+from app.api.dependencies import SeatDep, ServicesDep
 from app.labeling.track import ActionError
 
 router = APIRouter(prefix="/api/registrations", tags=["uncertainty"])

@@ -11,8 +11,7 @@ import websockets
 from fastapi import APIRouter, Depends, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
-from app.api.dependencies import Id, get_services, identify, is_same_origin
-from app.api.registrations import SeatDep
+from app.api.dependencies import Id, SeatDep, get_services, identify, is_same_origin
 from app.labeling.desk import NotFoundError, Seat
 from app.services import Services
 

@@ -49,6 +49,8 @@ class SessionState:
     """All that a page or a script may want to know of a session at one moment."""
 
     registration_id: int
+    revision: int
+    """Grows with every change, also when the session is opened anew: the larger state is the newer."""
     state: str
     skip_reason: str | None
     frame_id: int
@@ -128,6 +130,7 @@ class LabelingSession:
         self._listeners: list[Callable[[SessionState], None]] = []
         self._gizmo_axes: GizmoAxes = "object"
         self._layers = Layers()
+        self._revision = time.time_ns() // 1_000_000
         self.last_used = time.monotonic()
 
     # -- what is seen ------------------------------------------------------------------------------
@@ -138,6 +141,7 @@ class LabelingSession:
             track, history = self._track, self._track.history
             return SessionState(
                 registration_id=self.registration_id,
+                revision=self._revision,
                 state=self._state,
                 skip_reason=self._skip_reason,
                 frame_id=track.frame_id,
@@ -507,6 +511,7 @@ class LabelingSession:
     def _changed(self) -> None:
         self.last_used = time.monotonic()
         self._machine.follow(self._is_open)
+        self._revision += 1
         state = self.snapshot()
         for listener in tuple(self._listeners):
             listener(state)

@@ -1,6 +1,6 @@
 /** Poses to choose from, as pictures: where the machine found the object, or what fits the depth alike. */
 
-import { del, get, put } from "../api.js";
+import { del, get } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { candidateCard, drawCard } from "./candidate_card.js";
 import { sharedDrawing } from "./outline.js";
@@ -76,7 +76,7 @@ export function candidatesPart(page) {
       let sent;
       do {
         sent = chosen;
-        await put(page.path("preview"), { T_world_object: cards[sent]?.T_world_object ?? null });
+        await page.put("preview", { T_world_object: cards[sent]?.T_world_object ?? null });
       } while (sent !== chosen);
     } catch (error) {
       page.message.problem(error);
@@ -101,7 +101,7 @@ export function candidatesPart(page) {
     }
     const body = { T_world_object: cards[index].T_world_object, technique: source.kind, stems_from: source.id };
     page.message.clear();
-    await put(page.path("pose"), body).catch(page.message.problem);
+    await page.put("pose", body).catch(page.message.problem);
   }
 
   /** True if there was something to take. */

@@ -1,6 +1,6 @@
 /** Copying a pose from a neighbouring frame of the video, or from another operator. */
 
-import { get, post } from "../api.js";
+import { get } from "../api.js";
 import { byId, element, picture } from "../dom.js";
 
 /** A part of the labelling page. */
@@ -21,13 +21,16 @@ export function copyPart(page) {
   async function show() {
     if (!page.canMove()) return;
     page.message.clear();
+    list.replaceChildren();
+    byId("copies-none").hidden = true;
+    dialog.showModal(); // at once: the next Enter is for it
     try {
       const { items } = await get(page.path("copies"));
       list.replaceChildren(...items.map(row));
       byId("copies-none").hidden = items.length > 0;
-      if (!dialog.open) dialog.showModal();
       list.querySelector("button")?.focus();
     } catch (error) {
+      dialog.close();
       page.message.problem(error);
     }
   }
@@ -41,7 +44,7 @@ export function copyPart(page) {
 
   async function copy({ registration_id }) {
     dialog.close();
-    await post(page.path("copy"), { registration_id }).catch(page.message.problem);
+    await page.post("copy", { registration_id }).catch(page.message.problem);
   }
 
   function draw() {

@@ -1,6 +1,5 @@
 /** The end of a task: skipping it with a reason, what comes next, and going back to it. */
 
-import { post } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { showNext } from "./next.js";
 import { possible } from "./panel.js";
@@ -27,7 +26,7 @@ export function endingPart(page) {
   async function skip(reason) {
     dialog.close();
     page.message.clear();
-    await post(page.path("skip"), { reason }).catch(page.message.problem);
+    await page.post("skip", { reason }).catch(page.message.problem);
   }
 
   function draw({ state, skip_reason: reason }, before) {

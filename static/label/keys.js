@@ -4,7 +4,8 @@
 export const MOD = /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl";
 
 /**
- * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}; `run` is handed the key.
+ * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}; `run` is handed the key and
+ * whether it repeats because it is held down.
  *
  * "Mod" is Ctrl or Cmd. viser takes W A S D Q E and the arrows for its camera, so no binding may.
  */
@@ -17,7 +18,7 @@ export function keyBindings(bindings) {
     if (!binding || belongsToControl(event) || document.querySelector("dialog[open]")) return;
     event.preventDefault();
     event.stopPropagation();
-    if (!event.repeat || binding.repeats) binding.run(pressed);
+    if (!event.repeat || binding.repeats) binding.run(pressed, event.repeat);
   }
 
   return (target) => target.addEventListener("keydown", onKeyDown, { capture: true });

@@ -44,6 +44,8 @@ let me = null;
 let task = null;
 let registration = null;
 let snapRequest = null;
+let steps = Promise.resolve(); // undo and redo under way, one after the other
+let stepsLeft = 0;
 let connected = true;
 
 const page = {
@@ -52,9 +54,11 @@ const page = {
   me: () => me,
   registration: () => registration,
   isConnected: () => connected,
+  put: (action, body) => change(put(path(action), body)),
+  post: (action, body) => change(post(path(action), body)),
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
-  showFrame: (frame) => put(path("frame"), { frame_id: frame.id }),
+  showFrame: (frame) => page.put("frame", { frame_id: frame.id }),
   leaveMode,
 };
 const PARTS = [
@@ -80,20 +84,20 @@ const PARTS = [
 const ACTIONS = {
   snap: requestSnap,
   cancel: async () => del(`/api/snaps/${registration.snap.id ?? (await snapRequest).id}`),
-  undo: () => post(path("undo")),
-  redo: () => post(path("redo")),
-  reset: () => post(path("reset")),
-  submit: async () => show(await post(path("submit"))), // at once: the next Enter goes on
-  reopen: () => post(path("reopen")),
-  "offer-accept": () => post(path("accept")),
-  "offer-dismiss": () => post(path("dismiss")),
+  undo: () => page.post("undo"),
+  redo: () => page.post("redo"),
+  reset: () => page.post("reset"),
+  submit: () => page.post("submit"),
+  reopen: () => page.post("reopen"),
+  "offer-accept": () => page.post("accept"),
+  "offer-dismiss": () => page.post("dismiss"),
 };
 
 const grouped = (group, bindings) => bindings.map((binding) => ({ group, ...binding }));
 const BINDINGS = [
   ...grouped("The task", [
-    { keys: ["Mod+Z"], does: "Undo", run: () => act("undo"), repeats: true },
-    { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: () => act("redo"), repeats: true },
+    { keys: ["Mod+Z"], does: "Undo", run: (_key, isHeld) => step("undo", isHeld), repeats: true },
+    { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: (_key, isHeld) => step("redo", isHeld), repeats: true },
     { keys: ["Shift+R"], does: "Back to the start pose", run: () => act("reset") },
     { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
     { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
@@ -111,7 +115,10 @@ const attachKeys = keyBindings(BINDINGS);
 
 attachKeys(window);
 releaseFocusAfterPointer(document);
-for (const id of Object.keys(ACTIONS)) byId(id).addEventListener("click", () => act(id));
+for (const id of Object.keys(ACTIONS)) {
+  const run = ["undo", "redo"].includes(id) ? step : act;
+  byId(id).addEventListener("click", () => run(id));
+}
 byId("closed-retry").addEventListener("click", () => location.reload());
 
 try {
@@ -165,9 +172,17 @@ function showFromServer(received) {
   show(received);
 }
 
-/** Draws a state of the registration: the only place where it changes. */
+/** Shows the answer to a change at once: what is pressed next goes by it. */
+async function change(request) {
+  const answer = await request;
+  show(answer);
+  return answer;
+}
+
+/** Draws a state of the registration, the only place where it changes; one that was overtaken is left out. */
 function show(received) {
   const before = registration;
+  if (before && received.revision < before.revision) return;
   registration = received;
   drawPanel(registration, connected);
   for (const part of PARTS) part.draw?.(registration, before);
@@ -185,7 +200,20 @@ function reportSnap(before, snap) {
 }
 
 async function act(name) {
-  if (pending.has(name) || !possible(registration, connected)[name]) return;
+  if (!pending.has(name) && possible(registration, connected)[name]) await perform(name);
+}
+
+/**
+ * Undo or redo. Each press counts, in its turn, while a key that is held goes on only after each answer.
+ * Whether there is anything to undo the server knows first: it says so where there is not.
+ */
+function step(name, isHeld = false) {
+  if ((isHeld && stepsLeft > 0) || !connected || registration?.state !== "open") return;
+  stepsLeft += 1;
+  steps = steps.then(() => perform(name)).finally(() => (stepsLeft -= 1));
+}
+
+async function perform(name) {
   pending.add(name);
   try {
     message.clear();

@@ -3,7 +3,6 @@
  * In `manual` there is no machine: whatever is marked `data-machine` is put away.
  */
 
-import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
 import { MOD } from "./keys.js";
 import { possible } from "./panel.js";
@@ -43,7 +42,7 @@ export function machinePart(page) {
   async function change(on) {
     if (switching) return;
     switching = true;
-    await put(page.path("live"), { on }).catch(page.message.problem);
+    await page.put("live", { on }).catch(page.message.problem);
     switching = false;
   }
 

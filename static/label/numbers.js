@@ -1,6 +1,5 @@
 /** The pose of the object in the camera as numbers, which can be typed over. */
 
-import { put } from "../api.js";
 import { poseNumbers, product, withNumber } from "./pose.js";
 
 /** A part of the labelling page. */
@@ -42,7 +41,7 @@ export function numbersPart(page) {
     const { T_world_camera } = frames.find((frame) => frame.id === frameId);
     const body = { T_world_object: product(T_world_camera, withNumber(T, name, value)), technique: "numbers" };
     page.message.clear();
-    await put(page.path("pose"), body).catch(page.message.problem);
+    await page.put("pose", body).catch(page.message.problem);
   }
 
   return { open: (_task, scene) => (frames = scene.frames), draw };

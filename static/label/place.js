@@ -1,6 +1,5 @@
 /** Placing the object by a double click on the cloud or the colour image, or by a click after a key. */
 
-import { post } from "../api.js";
 import { byId } from "../dom.js";
 import { scenePointing } from "./pointing.js";
 
@@ -32,7 +31,7 @@ export function placePart(page) {
   async function place(point) {
     page.message.clear();
     try {
-      await post(page.path("place"), point);
+      await page.post("place", point);
       leave();
     } catch (error) {
       page.message.problem(error);

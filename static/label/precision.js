@@ -1,6 +1,5 @@
 /** Small and exact changes of the pose: nudges by key, quarter turns, flips, putting down; the gizmo's axes. */
 
-import { post, put } from "../api.js";
 import { byId, setText } from "../dom.js";
 
 /** Millimetres and degrees alike. */
@@ -92,7 +91,7 @@ export function precisionPart(page) {
     sending = true;
     page.message.clear();
     try {
-      while (waiting.length) await post(page.path("nudge"), joined(waiting));
+      while (waiting.length) await page.post("nudge", joined(waiting));
     } catch (error) {
       waiting.length = 0;
       page.message.problem(error);
@@ -104,11 +103,11 @@ export function precisionPart(page) {
   async function rest() {
     if (!page.canMove()) return;
     page.message.clear();
-    await post(page.path("rest")).catch(page.message.problem);
+    await page.post("rest").catch(page.message.problem);
   }
 
   async function useGizmo(name) {
-    if (page.canMove()) await put(page.path("gizmo"), { axes: name }).catch(page.message.problem);
+    if (page.canMove()) await page.put("gizmo", { axes: name }).catch(page.message.problem);
   }
 
   const otherGizmo = () => (page.registration()?.gizmo_axes === "world" ? "object" : "world");

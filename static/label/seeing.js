@@ -1,6 +1,5 @@
 /** Seeing whether the pose is right: how depth agrees with it, and what the 3-D view shows or puts away. */
 
-import { put } from "../api.js";
 import { byId, setText } from "../dom.js";
 
 const REMEMBERED = "snap6d.layers";
@@ -31,7 +30,7 @@ export function seeingPart(page) {
   async function change(layers) {
     if (isChanging) return;
     isChanging = true;
-    await put(page.path("layers"), layers).catch(page.message.problem);
+    await page.put("layers", layers).catch(page.message.problem);
     isChanging = false;
   }
 

@@ -10,6 +10,7 @@ import uvicorn
 
 from app.api.dependencies import SESSION_COOKIE
 from app.auth import Role
+from app.labeling.desk import Seat
 from app.main import create_app
 from app.services import Services
 from tests.app.waiting import LONGEST, wait_until
@@ -54,6 +55,10 @@ class LiveServer:
         """The secret of a new login session."""
         auth = self.services.auth
         return auth.sign_in_with_link(auth.create_link(auth.ensure_user(name, role).id))
+
+    def seat(self, registration_id: int) -> Seat:
+        """The live session of a registration."""
+        return self.services.desk._seats[registration_id]
 
 
 @contextmanager

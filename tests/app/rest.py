@@ -1,8 +1,10 @@
 """Short ways to say what tests often do over REST."""
 
+import json
 from typing import Any
 
 import httpx
+import numpy as np
 
 from tests.app.waiting import wait_until
 
@@ -49,3 +51,21 @@ def sentence(answer: httpx.Response, status: int) -> str:
     assert isinstance(content["detail"], str) and content["detail"].endswith(".")
     assert "\n" not in content["detail"]
     return content["detail"]
+
+
+def url_of(registration: dict[str, Any]) -> str:
+    return f"/api/registrations/{registration['id']}"
+
+
+def put_pose(client: httpx.Client, registration: dict[str, Any], T: object) -> httpx.Response:
+    """Put the object at a pose, or at what is none."""
+    # written by json, since httpx refuses to send the NaN that Python's json reads
+    content = json.dumps({"T_world_object": T.tolist() if isinstance(T, np.ndarray) else T})
+    url = f"{url_of(registration)}/pose"
+    return client.put(url, content=content, headers={"content-type": "application/json"})
+
+
+def shown(answer: httpx.Response) -> np.ndarray:
+    """The pose that a successful answer tells."""
+    assert answer.status_code == 200, answer.text
+    return np.array(answer.json()["T_world_object"])

@@ -24,25 +24,20 @@ PIXEL = """([name, local]) => {
   return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
 }"""
 
-NEXT_PICTURE = """() => new Promise(done => {
-  let left = 3;
-  const wait = () => (left-- ? requestAnimationFrame(wait) : done());
-  wait();
-})"""
-"""Resolves when the 3-D view has drawn what it knows."""
+COUNT_PICTURES = """() => {
+  window.picturesLeft = 3;
+  const count = () => (window.picturesLeft -= 1) > 0 && requestAnimationFrame(count);
+  requestAnimationFrame(count);
+}"""
 
-STANDS_STILL = """() => new Promise(done => {
-  let still = 0, last = "";
-  const timer = setInterval(() => {
-    document.querySelectorAll(".mantine-Notification-closeButton").forEach(button => button.click());
-    const now = window.__viserMutable.camera.matrixWorld.elements.map(x => x.toFixed(4)).join();
-    still = now === last ? still + 1 : 0;
-    last = now;
-    if (still > 5) { clearInterval(timer); done(); }
-  }, 100);
-})"""
-"""Resolves when the camera no longer moves; closes the notice on software rendering, which swallows drags."""
-
+LOOK_AGAIN = "() => { window.stillness = { times: 0, camera: null }; }"
+STANDS_STILL = """() => {
+  document.querySelectorAll(".mantine-Notification-closeButton").forEach(button => button.click());
+  const camera = window.__viserMutable.camera.matrixWorld.elements.map(x => x.toFixed(4)).join();
+  const times = camera === window.stillness.camera ? window.stillness.times + 1 : 0;
+  window.stillness = { times, camera };
+  return times > 5;
+}"""
 
 DRAWN = """names => names.every(name => {
   const node = window.__viserMutable?.nodeRefFromName[name];
@@ -92,8 +87,20 @@ def view_frame(page: Page) -> Frame:
     frame = element.content_frame()
     assert frame is not None
     frame.wait_for_function(DRAWN, arg=NODES)
-    frame.evaluate(STANDS_STILL)
+    wait_for_camera(frame)
     return frame
+
+
+def wait_for_camera(frame: Frame) -> None:
+    """Return when the camera stands still; closes the notice on software rendering, which swallows drags."""
+    frame.evaluate(LOOK_AGAIN)
+    frame.wait_for_function(STANDS_STILL, polling=100)
+
+
+def wait_for_picture(frame: Frame) -> None:
+    """Return when the 3-D view has drawn what it knows, and looked for what is under the pointer."""
+    frame.evaluate(COUNT_PICTURES)
+    frame.wait_for_function("() => window.picturesLeft <= 0")
 
 
 def expect_new_view(frame: Frame) -> None:
@@ -115,7 +122,7 @@ def drag(page: Page, frame: Frame, handle: Handle, amount: float, steps: int = 6
     end = pixel(page, frame, handle.moved_grip(amount))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
+    wait_for_picture(frame)
     page.mouse.down()
     for step in range(1, steps + 1):
         page.mouse.move(*(start + (end - start) * step / steps))

@@ -15,8 +15,8 @@ from registration_core import Intrinsics, ObjectModel, pose
 from registration_core.rasterizer import render_depth
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, pixel
-from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.gizmo import Handle, pixel, wait_for_picture
+from tests.e2e.test_labelling import Desk
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -156,7 +156,7 @@ def test_what_is_drawn_is_what_the_library_renders(image: Image) -> None:
 def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     desk, page = image.desk, image.page
     assert page.request.post(f"{desk.url}/reset").ok
-    desk.frame.evaluate(NEXT_PICTURE)
+    wait_for_picture(desk.frame)
     expected = image.silhouette(np.array(desk.state["T_camera_object"])).nonzero()
     wait_until(lambda: np.linalg.norm(image.place - np.mean(expected, axis=1)[::-1]) < 5, "the start pose")
     before = image.place
@@ -164,7 +164,7 @@ def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
+    wait_for_picture(desk.frame)
     page.mouse.down()
     for share in (0.3, 0.6, 1.0):
         page.mouse.move(*(start + share * (end - start)))

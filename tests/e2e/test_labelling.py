@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from app.tables import Condition
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import NEXT_PICTURE, Handle, drag, expect_new_view, view_frame
+from tests.e2e.gizmo import Handle, drag, expect_new_view, view_frame, wait_for_picture
 from tests.processes import Server, command_line, descendants, serving
 
 pytestmark = pytest.mark.e2e
@@ -96,7 +96,7 @@ class Desk:
         before = sum(event["kind"] == "drag" for event in items)
         drag(self.page, self.frame, Handle(handle, self.scale), amount)
         event = self.events("drag", before + 1)[-1]
-        self.frame.evaluate(NEXT_PICTURE)
+        wait_for_picture(self.frame)
         return event
 
 
@@ -130,11 +130,9 @@ def test_keys_undo_redo_reset_and_reload(desk: Desk) -> None:
     start = desk.pose
     desk.drag("tx", 0.03)
     moved = desk.pose
-    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")  # the focus is in the 3-D view after a drag
     desk.events("undo")
     assert np.allclose(desk.pose, start)
-    expect(page.locator("#redo")).to_be_enabled()  # the page hears of it after the log
     page.keyboard.press("Control+Shift+z")
     desk.events("redo")
     assert np.allclose(desk.pose, moved)
@@ -143,8 +141,6 @@ def test_keys_undo_redo_reset_and_reload(desk: Desk) -> None:
     assert np.allclose(desk.pose, start)
     page.reload()
     view_frame(page)
-    expect(page.locator("#undo")).to_be_enabled()
-    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo", 2)
     assert np.allclose(desk.pose, moved)
@@ -165,7 +161,6 @@ def test_snap_with_space_improves_and_can_be_undone(desk: Desk, server: Server) 
     snap = page.request.get(f"{desk.root}/api/snaps/{applied['snap_id']}").json()
     assert snap["state"] == "done"
     assert 0 <= snap["estimate"]["confidence"] <= 1
-    expect(page.locator("#undo")).to_be_enabled()
     page.keyboard.press("Control+z")
     desk.events("undo")
     assert np.allclose(desk.pose, before)
@@ -185,7 +180,7 @@ def test_a_snap_can_be_cancelled(desk: Desk) -> None:
 
 def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk) -> None:
     page = desk.page
-    quick = {"preset": "paper", "particle_filter": {"iterations": 4000, "particles": 200}}
+    quick = {"preset": "paper", "particle_filter": {"iterations": 1000, "particles": 200}}
     assert page.request.post(f"{desk.url}/snaps", data={"config": quick}).ok
     desk.drag("ty", 0.02)
     desk.events("snap_offered")

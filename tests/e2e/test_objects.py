@@ -10,8 +10,8 @@ from playwright.sync_api import Page, expect
 from app.config import PROJECT
 from registration_core.bop import read_dataset
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import view_frame
-from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.gizmo import view_frame, wait_for_picture
+from tests.e2e.test_labelling import Desk
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -55,7 +55,7 @@ def test_what_is_done_is_shown_listed_and_hidden(server: Server, open_page: Call
     desk.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        desk.frame.evaluate(NEXT_PICTURE)
+        wait_for_picture(desk.frame)
         take_picture(page, f"label-objects-{scheme}")
     page.keyboard.press("Shift+B")
     desk.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)

@@ -12,9 +12,9 @@ from playwright.sync_api import Browser, expect
 from registration_core import pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, pixel
+from tests.e2e.gizmo import Handle, pixel, wait_for_picture
 from tests.e2e.test_image import Image
-from tests.e2e.test_labelling import NEXT_PICTURE, Desk
+from tests.e2e.test_labelling import Desk
 from tests.e2e.test_readme import true_pose
 from tests.processes import Server
 
@@ -55,7 +55,7 @@ def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
     start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
-    desk.frame.evaluate(NEXT_PICTURE)  # the page looks for what is under the pointer once a picture
+    wait_for_picture(desk.frame)
     page.mouse.down()
     wait_until(lambda: desk.state["dragging"], "the drag")
     before, began = page.evaluate("redraws"), time.monotonic()
@@ -107,7 +107,7 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
         expect(row).to_have_text(f"{100 * shown:.0f} %")
         assert shown > 0.7
         desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
-        desk.frame.evaluate(NEXT_PICTURE)
+        wait_for_picture(desk.frame)
         page.emulate_media(color_scheme="dark" if verdict == "behind" else "light")
         take_picture(page, f"label-agreement-{verdict}")
     page.get_by_role("button", name="Agreement").click()

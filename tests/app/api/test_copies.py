@@ -14,10 +14,9 @@ from app.auth import Role
 from app.importing import import_dataset
 from app.main import create_services
 from registration_core import pose
-from tests.app.api.test_registrations import log_of, put_pose, shown, url_of
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
-from tests.app.rest import sentence
+from tests.app.rest import log_of, put_pose, sentence, shown, url_of
 from tests.app.small_dataset import TOOL, UNPOSED_SCENE
 
 FIRST, SECOND = pose.exp([0.1, 0.0, 0.7, 0.2, 0.0, 0.0]), pose.exp([0.0, 0.1, 0.8, 0.0, 0.3, 0.0])

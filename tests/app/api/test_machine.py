@@ -6,11 +6,10 @@ import httpx
 import numpy as np
 import pytest
 
-from app.labeling.desk import Seat
 from registration_core import pose
 from registration_core.pose_error import adi
 from tests.app.live import LiveServer
-from tests.app.rest import begin, finished_snap, kinds, log_of, sentence
+from tests.app.rest import begin, finished_snap, kinds, log_of, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose
 from tests.app.waiting import wait_until
 
@@ -23,15 +22,6 @@ def begin_under(admin: httpx.Client, condition: str) -> dict[str, Any]:
     wanted = {"scene_id": task["scene"]["id"], "object_id": task["object"]["id"], "condition": condition}
     task_id = admin.post("/api/tasks", json=wanted).json()["id"]
     return admin.post(f"/api/tasks/{task_id}/registration").json()
-
-
-def url_of(registration: dict[str, Any]) -> str:
-    return f"/api/registrations/{registration['id']}"
-
-
-def seat_of(live: LiveServer, registration: dict[str, Any]) -> Seat:
-    (seat,) = [s for s in live.services.desk._seats.values() if s.registration.id == registration["id"]]
-    return seat
 
 
 def put_near(client: httpx.Client, registration: dict[str, Any]) -> dict[str, Any]:
@@ -64,7 +54,7 @@ def test_it_is_off_and_shows_nothing_at_first(script: httpx.Client) -> None:
 def test_a_live_result_is_seen_and_not_logged(
     script: httpx.Client, looked: dict[str, Any], live: LiveServer
 ) -> None:
-    model = seat_of(live, looked).model
+    model = live.seat(looked["id"]).model
     assert adi(np.array(looked["live"]["T_world_object"]), true_pose(TOOL), model.vertices) < 0.003
     assert 0 <= looked["live"]["confidence"] <= 1
     assert np.allclose(looked["T_world_object"], NEAR)
@@ -120,7 +110,7 @@ def test_in_manual_a_snap_is_refused_in_one_sentence(admin: httpx.Client) -> Non
 
 def test_in_auto_the_end_of_a_drag_is_followed_by_the_machine(live: LiveServer, admin: httpx.Client) -> None:
     registration = begin_under(admin, "auto")
-    session = seat_of(live, registration).session
+    session = live.seat(registration["id"]).session
     session.start_drag()
     session.drag_to(NEAR)
     session.end_drag()

@@ -9,12 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from app.labeling.desk import Seat
 from registration_core import pose
-from tests.app.api.test_registrations import log_of, put_pose, seat_of, shown, url_of
 from tests.app.export.site import CAMERA, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import CAMERA as VISER_CAMERA
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.live import LiveServer
-from tests.app.rest import begin, sentence
+from tests.app.rest import begin, log_of, put_pose, sentence, shown, url_of
 from tests.app.small_dataset import NEAR_VIEW, true_pose
 from tests.app.waiting import wait_until
 
@@ -86,7 +85,7 @@ def test_the_views_axes_are_those_of_the_open_page(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
     T = shown(put_pose(script, registration, true_pose(TOOL)))
-    seat = seat_of(live, registration)
+    seat = live.seat(registration["id"])
     with open_view(live, seat) as client:
         seen_from_the_corner(client)
         away = -np.ones(3) / np.sqrt(3)
@@ -156,7 +155,7 @@ def test_a_click_on_the_object_in_the_image_brings_it_there(
 def test_a_click_on_the_table_in_the_view_lets_it_stand_there(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
-    seat = seat_of(live, registration)
+    seat = live.seat(registration["id"])
     with open_view(live, seat) as client:
         seen_from_the_corner(client)
         wait_until(lambda: seat.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
@@ -191,7 +190,7 @@ def test_the_view_looks_from_elsewhere_and_nothing_is_logged(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any], at: str
 ) -> None:
     T = shown(put_pose(script, registration, true_pose(TOOL)))
-    seat = seat_of(live, registration)
+    seat = live.seat(registration["id"])
     logged = log_of(script, registration["id"])
     with open_view(live, seat) as client:
         seen_from_the_corner(client)
@@ -224,7 +223,7 @@ def test_the_view_stays_during_a_drag_and_without_a_page(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
     assert "Nobody has the 3-D view" in sentence(post(script, registration, "look", at="top"), 409)
-    seat = seat_of(live, registration)
+    seat = live.seat(registration["id"])
     with open_view(live, seat):
         seat.session.start_drag()
         assert "being dragged" in sentence(post(script, registration, "look", at="top"), 409)
@@ -238,7 +237,7 @@ def test_the_gizmos_axes_are_chosen(
     assert registration["gizmo_axes"] == "object"
     url = f"{url_of(registration)}/gizmo"
     assert script.put(url, json={"axes": "world"}).json()["gizmo_axes"] == "world"
-    session = seat_of(live, registration).session
+    session = live.seat(registration["id"]).session
     T = np.array(registration["T_world_object"])
     session.start_drag()
     assert "being dragged" in sentence(script.put(url, json={"axes": "object"}), 409)

@@ -1,42 +1,20 @@
 """Registrations by REST alone: a script can do all that a page can, and is logged like any other."""
 
 import itertools
-import json
 import math
-import time
-from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 
-from app.api import registrations
-from app.auth import Actor, Role
-from app.labeling.desk import Seat
+from app.auth import Role
 from registration_core import pose
 from tests.app.live import LiveServer
-from tests.app.rest import begin, kinds, log_of, sentence
+from tests.app.rest import begin, kinds, log_of, put_pose, sentence, shown, url_of
 from tests.app.small_dataset import TOOL, true_pose
-from tests.app.waiting import LONGEST, wait_until
 
 ACTIONS = ("undo", "redo", "reset", "accept", "dismiss", "submit")
-
-
-def url_of(registration: dict[str, Any]) -> str:
-    return f"/api/registrations/{registration['id']}"
-
-
-def put_pose(client: httpx.Client, registration: dict[str, Any], T: object) -> httpx.Response:
-    # written by json, since httpx refuses to send the NaN that Python's json reads
-    content = json.dumps({"T_world_object": T.tolist() if isinstance(T, np.ndarray) else T})
-    url = f"{url_of(registration)}/pose"
-    return client.put(url, content=content, headers={"content-type": "application/json"})
-
-
-def shown(answer: httpx.Response) -> np.ndarray:
-    assert answer.status_code == 200, answer.text
-    return np.array(answer.json()["T_world_object"])
 
 
 @pytest.fixture
@@ -55,6 +33,16 @@ def test_the_state_says_how_depth_agrees(script: httpx.Client, registration: dic
     wrong = put_pose(script, registration, true_pose(TOOL) @ pose.exp([0.02, 0, 0, 0, 0, 0.3])).json()
     assert wrong["agreement"]["inlier_share"] < right["inlier_share"] - 0.2
     assert put_pose(script, registration, pose.exp([9.0, 9.0, 0, 0, 0, 0])).json()["agreement"] is None
+
+
+def test_every_change_has_a_larger_revision(live: LiveServer, script: httpx.Client) -> None:
+    first = begin(script)
+    moved = put_pose(script, first, true_pose(TOOL)).json()
+    undone = script.post(f"{url_of(first)}/undo").json()
+    live.services.desk.close_idle(0.0)
+    opened_again = script.get(url_of(first)).json()
+    revisions = [state["revision"] for state in (first, moved, undone, opened_again)]
+    assert revisions == sorted(set(revisions))
 
 
 def test_layers_are_chosen(script: httpx.Client, registration: dict[str, Any]) -> None:
@@ -233,7 +221,7 @@ def test_a_submitted_registration_stays_as_it_is(script: httpx.Client, registrat
 
 def test_during_a_drag_a_script_has_to_wait(live: LiveServer, script: httpx.Client) -> None:
     registration = begin(script)
-    session = seat_of(live, registration).session
+    session = live.seat(registration["id"]).session
     session.start_drag()
     state = script.get(url_of(registration)).json()
     assert state["dragging"] and not state["saved"]
@@ -285,106 +273,3 @@ def test_a_registration_that_does_not_exist_is_said(script: httpx.Client, regist
     for address in ("", "/events", "/stream"):
         answer = script.get(f"/api/registrations/{registration_id}{address}")
         sentence(answer, 404 if registration_id == "999999" else 422)
-
-
-# -- the stream
-
-
-def seat_of(live: LiveServer, registration: dict[str, Any]) -> Seat:
-    (seat,) = [s for s in live.services.desk._seats.values() if s.registration.id == registration["id"]]
-    return seat
-
-
-def messages(answer: httpx.Response) -> Iterator[dict[str, Any]]:
-    """The registrations that a stream tells."""
-    assert answer.status_code == 200
-    assert answer.headers["content-type"].startswith("text/event-stream")
-    kind = None
-    deadline = time.monotonic() + LONGEST  # pings keep a silent stream alive for ever
-    for line in answer.iter_lines():
-        assert time.monotonic() < deadline, "the stream tells nothing"
-        name, _, value = line.partition(": ")
-        if name == "event":
-            kind = value
-        elif name == "data":
-            assert kind == "registration"
-            yield json.loads(value)
-
-
-def test_a_stream_tells_the_state_at_once_and_after_each_change(
-    script: httpx.Client, registration: dict[str, Any]
-) -> None:
-    with script.stream("GET", f"{url_of(registration)}/stream") as answer:
-        told = messages(answer)
-        assert next(told) == registration
-        changed = put_pose(script, registration, true_pose(TOOL)).json()
-        assert next(told) == changed
-        undone = script.post(f"{url_of(registration)}/undo").json()
-        assert next(told) == undone
-        submitted = script.post(f"{url_of(registration)}/submit").json()
-        assert next(told) == submitted
-
-
-def test_a_stream_may_skip_but_always_tells_the_last(
-    live: LiveServer, script: httpx.Client, registration: dict[str, Any]
-) -> None:
-    session = seat_of(live, registration).session
-    with script.stream("GET", f"{url_of(registration)}/stream") as answer:
-        told = messages(answer)
-        next(told)
-        session.start_drag()
-        for i in range(200):
-            session.drag_to(pose.exp([0.001 * i, 0, 0.5, 0, 0, 0]))
-        session.end_drag()
-        count = 0
-        for message in told:
-            count += 1
-            if not message["dragging"]:
-                break
-        assert count < 50
-        assert np.allclose(message["T_world_object"], pose.exp([0.199, 0, 0.5, 0, 0, 0]))
-        assert message["saved"] and message["can_undo"]
-
-
-def test_a_stream_gives_signs_of_life_until_the_login_ends(
-    live: LiveServer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(registrations, "SECONDS_BETWEEN_SIGNS_OF_LIFE", 0.05)
-    person = live.person("whose login ends")
-    registration = begin(person)
-    with person.stream("GET", f"{url_of(registration)}/stream") as answer:
-        told = messages(answer)
-        assert [next(told) for _ in range(4)] == [registration] * 4
-        assert person.post("/api/sign-out").status_code == 204
-        for again in told:
-            assert again == registration
-
-
-def test_a_stream_keeps_its_session_until_it_is_left(live: LiveServer, script: httpx.Client) -> None:
-    registration = begin(script, 1)
-    seat = seat_of(live, registration)
-    with script.stream("GET", f"{url_of(registration)}/stream") as answer:
-        told = messages(answer)  # kept: a generator that is thrown away closes the stream
-        next(told)
-        assert seat.watchers == 1
-    wait_until(lambda: seat.watchers == 0, "the stream to be left")
-    seat.session.set_pose(true_pose(TOOL), Actor.SCRIPT)
-
-
-def test_a_newer_page_takes_over_and_the_older_says_so(
-    script: httpx.Client, registration: dict[str, Any]
-) -> None:
-    url = f"{url_of(registration)}/stream"
-    with script.stream("GET", url, params={"page": "older"}) as older, script.stream("GET", url) as watching:
-        lines = older.iter_lines()
-        assert "event: registration" in itertools.takewhile(bool, lines)
-        watched = messages(watching)
-        assert next(watched) == registration
-        with script.stream("GET", url, params={"page": "newer"}) as newer:
-            told = messages(newer)
-            assert next(told) == registration
-            ending = list(lines)
-            assert "event: taken_over" in ending and "event: registration" not in ending
-            changed = put_pose(script, registration, true_pose(TOOL)).json()
-            assert next(told) == changed
-            assert next(watched) == changed

@@ -20,9 +20,9 @@ def una(live) -> Operator:
     una = Operator(live, "una of the replay")
     start = np.array(una.registration["T_world_object"])
     with una.view() as view:
+        wait_until(lambda: "view" in kinds_of(una), "the camera")
         view.drag([start @ una.T_object_gizmo @ pose.exp([0, 0.01 * i, 0, 0, 0, 0]) for i in range(1, 5)])
         wait_until(lambda: "drag" in kinds_of(una), "the drag")
-        wait_until(lambda: "view" in kinds_of(una), "the camera")
     assert una.http.post(f"{url_of(una.id)}/submit").status_code == 200
     return una
 

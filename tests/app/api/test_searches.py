@@ -35,7 +35,7 @@ def test_a_search_is_the_librarys_and_a_candidate_is_taken(
     assert (search["state"], search["seed"], search["region"]) == ("done", 7, None)
     assert operator.get(url).json()["search"] == {"id": search["id"], "state": "done", "message": None}
 
-    seat = server.services.desk._seats[int(url.rsplit("/", 1)[1])]
+    seat = server.seat(int(url.rsplit("/", 1)[1]))
     frame = seat.frames[search["frame_id"]]
     depth = server.services.data.depth(frame)
     here = propose(

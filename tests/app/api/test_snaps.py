@@ -18,7 +18,7 @@ from registration_core.pose_error import adi
 from tests.app.api.test_problems import full_disk
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
-from tests.app.rest import SLOW_SNAP, begin, finished_snap, kinds, log_of, sentence
+from tests.app.rest import SLOW_SNAP, begin, finished_snap, kinds, log_of, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose
 from tests.app.waiting import wait_until
 
@@ -32,10 +32,6 @@ def near(script: httpx.Client) -> dict[str, Any]:
     answer = script.put(url_of(registration) + "/pose", json={"T_world_object": NEAR.tolist()})
     assert answer.status_code == 200
     return answer.json()
-
-
-def url_of(registration: dict[str, Any]) -> str:
-    return f"/api/registrations/{registration['id']}"
 
 
 def request_snap(client: httpx.Client, registration: dict[str, Any], **body: object) -> str:
@@ -62,7 +58,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
     assert (done["state"], done["progress"], done["message"]) == ("done", 1.0, None)
     assert done["standing"] is None
     estimate = done["estimate"]
-    frame = live.services.desk._seats[near["id"]].frames[near["frame_id"]]
+    frame = live.seat(near["id"]).frames[near["frame_id"]]
     with live.services.database.read() as session:
         tool = session.get_one(Object, script.get(f"/api/tasks/{near['task_id']}").json()["object"]["id"])
     expected = snap(
@@ -92,7 +88,7 @@ def test_a_finished_snap_moves_the_object(
     assert state["T_world_object"] == done["estimate"]["T_world_object"]
     assert state["confidence"] == done["estimate"]["confidence"]
     assert (state["snap"]["id"], state["snap"]["state"]) == (snap_id, "done")
-    vertices = live.services.desk._seats[near["id"]].model.vertices
+    vertices = live.seat(near["id"]).model.vertices
     assert adi(np.array(state["T_world_object"]), true_pose(TOOL), vertices) < 0.003
     requested, applied = log_of(script, near["id"])[-2:]
     assert (requested["kind"], requested["actor"]) == ("snap_requested", "script")
@@ -129,7 +125,7 @@ def test_a_snap_searches_as_far_as_it_is_told_and_can_be_repeated(
 def test_where_nothing_is_told_the_last_drags_tell(
     live: LiveServer, script: httpx.Client, near: dict[str, Any]
 ) -> None:
-    session = live.services.desk._seats[near["id"]].session
+    session = live.seat(near["id"]).session
     session.start_drag()
     session.drag_to(NEAR @ pose.exp([0.05, 0, 0, 0, 0, 0]))
     session.end_drag()

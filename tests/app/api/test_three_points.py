@@ -10,10 +10,9 @@ from app.auth import Role
 from app.labeling.placement import measured_points, point_at_pixel
 from registration_core import pose
 from tests.app.api.test_placement import open_view, pixel_of
-from tests.app.api.test_registrations import log_of, seat_of, shown, url_of
 from tests.app.export.site import CAMERA, TOOL, mesh_of, model_of, observed_depth
 from tests.app.live import LiveServer
-from tests.app.rest import begin, finished_snap, sentence
+from tests.app.rest import begin, finished_snap, log_of, sentence, shown, url_of
 from tests.app.small_dataset import NEAR_VIEW, true_pose
 
 MODEL = model_of(mesh_of(TOOL))
@@ -145,7 +144,7 @@ def test_a_point_is_told_and_marks_are_drawn_where_the_view_is_open(
     assert np.linalg.norm(np.array(point) - centre) < MODEL.radius
     marks = {"points_world": [point, [0, 0, 0]]}
     assert "Nobody has the 3-D view" in sentence(script.put(f"{url}/marks", json=marks), 409)
-    with open_view(live, seat_of(live, registration)) as client:
+    with open_view(live, live.seat(registration["id"])) as client:
         assert script.put(f"{url}/marks", json=marks).status_code == 204
         label = client.node("LabelMessage", "/marks/1/number")
         assert label["props"]["text"] == "1"

@@ -36,7 +36,7 @@ class Operator:
 
     @property
     def T_object_gizmo(self) -> np.ndarray:
-        seat = self.live.services.desk._seats[self.id]
+        seat = self.live.seat(self.id)
         return pose.from_rotation_translation(np.eye(3), seat.model.centre)
 
 
@@ -129,7 +129,7 @@ def test_the_public_tunnel_is_refused_through_the_door(ann):
         view.drag([np.array(ann.registration["T_world_object"]) @ ann.T_object_gizmo @ pose.exp([0.01] * 6)])
         wait_until(lambda: len(log_of(ann.http, ann.id)) > before, "the drag")
         assert not [m for m in view.messages if m["type"].startswith("ShareUrl")]
-    assert ann.live.services.desk._seats[ann.id].view._server._share_tunnel is None
+    assert ann.live.seat(ann.id).view._server._share_tunnel is None
 
 
 def test_a_drag_is_in_the_log_with_its_freedom_and_its_way(live):
@@ -178,7 +178,7 @@ def test_each_users_drags_are_in_their_own_log_only(live):
 
 def test_a_session_is_watched_as_long_as_its_view_is_open(live):
     gil = Operator(live, "gil of the proxy")
-    seat = live.services.desk._seats[gil.id]
+    seat = live.seat(gil.id)
     with gil.view() as view:
         view.node("MeshMessage", "/object/mesh")
         assert seat.watchers == 1
@@ -189,7 +189,7 @@ def test_the_page_learns_that_its_view_came_and_went(live):
     hal = Operator(live, "hal of the proxy")
     url = f"/api/registrations/{hal.id}"
     told: list[bool] = []
-    seat = live.services.desk._seats[hal.id]
+    seat = live.seat(hal.id)
     seat.session.subscribe(lambda _state: told.append(seat.viewers > 0))
     assert not hal.http.get(url).json()["view_open"]
     with hal.view() as view:

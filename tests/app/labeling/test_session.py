@@ -162,8 +162,8 @@ def bench() -> Bench:
 
 
 def same(a: SessionState, b: SessionState) -> bool:
-    """Whether nothing changed but the message."""
-    names = set(a.__dataclass_fields__) - {"message", "T_world_object"}
+    """Whether nothing changed but the revision and the message."""
+    names = set(a.__dataclass_fields__) - {"revision", "message", "T_world_object"}
     return np.array_equal(a.T_world_object, b.T_world_object) and all(
         getattr(a, name) == getattr(b, name) for name in names
     )

@@ -1,0 +1,183 @@
+"""A live session as JSON: what a page or a script may know of a registration at one moment."""
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.desk import Seat
+from app.labeling.layers import Layers
+from app.labeling.session import SessionState
+from app.tables import Pose
+from registration_core import pose
+from registration_core.depth_agreement import Verdict
+
+
+class SnapOut(BaseModel):
+    """The last snap of a registration."""
+
+    id: str
+    asked_by: str = Field(description="human, script, or in `auto` the machine by itself")
+    state: str
+    progress: float
+    message: str | None
+
+
+class OfferOut(BaseModel):
+    """A pose that the machine offers."""
+
+    snap_id: str
+    T_world_object: Pose
+    confidence: float
+    quiet: bool = Field(description="Nobody asked for it: it can be taken, and asks for no answer.")
+
+
+class LiveOut(BaseModel):
+    """Where a snap would land now."""
+
+    T_world_object_start: Pose = Field(description="The pose that it would start from.")
+    T_world_object: Pose
+    confidence: float
+
+
+class SearchOut(BaseModel):
+    """The last search of a registration, until its candidates are taken or put away."""
+
+    id: str
+    state: str
+    message: str | None
+
+
+class AgreementOut(BaseModel):
+    """How well the shown frame's depth agrees with the object where it is now."""
+
+    inlier_share: float | None = Field(
+        description="Matches among the pixels with depth that nothing hides; null where these are too few."
+    )
+    median_residual: float | None = Field(description="Of the matches, metres, without sign.")
+    match: float = Field(description="Like the three below a share of the object's visible surface.")
+    in_front: float = Field(description="The object is nearer than what was measured.")
+    behind: float = Field(description="The object is farther away than what was measured.")
+    no_data: float
+
+
+class RegistrationOut(BaseModel):
+    """One operator's work on one task, now."""
+
+    id: int
+    revision: int = Field(description="Grows with every change: of two states the larger is the newer.")
+    task_id: int
+    condition: str
+    state: str
+    skip_reason: str | None
+    frame_id: int
+    T_world_object: Pose
+    T_camera_object: Pose
+    confidence: float | None
+    can_undo: bool
+    can_redo: bool
+    dragging: bool
+    gizmo_axes: GizmoAxes
+    """Along which the gizmo's arrows lie."""
+    layers: Layers
+    """What the 3-D view shows."""
+    agreement: AgreementOut | None
+    """Nothing where no part of the object is in the frame."""
+    saved: bool
+    """Whether all of it is on the disk: a drag is when it ends."""
+    snap: SnapOut | None
+    offer: OfferOut | None
+    is_live: bool
+    live: LiveOut | None
+    estimate_snap_id: str | None = Field(description="The snap that the pose stems from.")
+    search: SearchOut | None
+    preview: Pose | None = Field(description="T_world_object that is looked at before it is taken.")
+    message: str | None
+    view_url: str
+    view_open: bool
+    """Whether a page is connected to the 3-D view."""
+
+
+def registration_out(seat: Seat) -> RegistrationOut:
+    """A live session as JSON."""
+    state = seat.session.snapshot()
+    T_world_camera = np.array(seat.frames[state.frame_id].T_world_camera)
+    return RegistrationOut(
+        id=state.registration_id,
+        revision=state.revision,
+        task_id=seat.registration.task_id,
+        condition=seat.registration.task.condition,
+        state=state.state,
+        skip_reason=state.skip_reason,
+        frame_id=state.frame_id,
+        T_world_object=state.T_world_object.tolist(),
+        T_camera_object=(pose.inverse(T_world_camera) @ state.T_world_object).tolist(),
+        confidence=state.confidence,
+        can_undo=state.can_undo,
+        can_redo=state.can_redo,
+        dragging=state.dragging,
+        gizmo_axes=state.gizmo_axes,
+        layers=state.layers,
+        agreement=_agreement_out(seat, state),
+        saved=not state.dragging,
+        snap=_snap_out(state),
+        offer=_offer_out(state),
+        is_live=state.is_live,
+        live=_live_out(state),
+        estimate_snap_id=state.estimate_snap_id,
+        search=_search_out(state),
+        preview=None if state.preview is None else state.preview.tolist(),
+        message=state.message,
+        view_url=f"/view/{state.registration_id}/",
+        view_open=seat.viewers > 0,
+    )
+
+
+def _snap_out(state: SessionState) -> SnapOut | None:
+    snap = state.snap
+    if snap is None:
+        return None
+    return SnapOut(
+        id=snap.id, asked_by=snap.asked_by, state=snap.state, progress=snap.progress, message=snap.message
+    )
+
+
+def _agreement_out(seat: Seat, state: SessionState) -> AgreementOut | None:
+    agreement = seat.reading.of(state.frame_id, state.T_world_object)
+    if not len(agreement.verdicts):
+        return None
+    return AgreementOut(
+        inlier_share=agreement.inlier_share,
+        median_residual=agreement.median_residual,
+        match=agreement.share(Verdict.MATCH),
+        in_front=agreement.share(Verdict.IN_FRONT),
+        behind=agreement.share(Verdict.BEHIND),
+        no_data=agreement.share(Verdict.NO_DATA),
+    )
+
+
+def _offer_out(state: SessionState) -> OfferOut | None:
+    offer = state.offer
+    if offer is None:
+        return None
+    return OfferOut(
+        snap_id=offer.snap_id,
+        T_world_object=offer.T_world_object.tolist(),
+        confidence=offer.confidence,
+        quiet=offer.quiet,
+    )
+
+
+def _live_out(state: SessionState) -> LiveOut | None:
+    live = state.live
+    if live is None:
+        return None
+    return LiveOut(
+        T_world_object_start=live.T_world_object_start.tolist(),
+        T_world_object=live.T_world_object.tolist(),
+        confidence=live.confidence,
+    )
+
+
+def _search_out(state: SessionState) -> SearchOut | None:
+    search = state.search
+    return SearchOut(id=search.id, state=search.state, message=search.message) if search else None
