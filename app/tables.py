@@ -28,8 +28,9 @@ from sqlalchemy.orm import (
 )
 
 Pose = list[list[float]]
-Condition = Literal["manual", "snap", "auto"]
-"""What the machine does in a task: nothing, what it is asked for, or more when it is sure."""
+Condition = Literal["manual", "snap", "auto", "three points", "click-to-place", "live snap", "find it"]
+"""What a task may be done with: no machine, one that is asked, one that does more when it is sure; or, where
+studies compare techniques, the gizmo, Snap, and this one."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -268,3 +269,87 @@ class Export(Base):
     user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     dataset: Mapped[Dataset] = relationship()
+
+
+class Study(Base):
+    """A study: who is to do what in which order, and what they are told."""
+
+    __tablename__ = "studies"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(200), unique=True)
+    plan: Mapped[dict[str, Any]]
+    """As JSON: conditions, modes, groups and their sizes, tasks, practice, texts, questions, breaks."""
+    seed: Mapped[int] = mapped_column(BigInteger)
+    is_simulated: Mapped[bool] = mapped_column(default=False)
+    state: Mapped[str] = mapped_column(String(20), default="open")
+    """open or closed."""
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    participants: Mapped[list["Participant"]] = relationship(
+        order_by="Participant.id", back_populates="study"
+    )
+
+
+class Participant(Base):
+    """One operator of a study: a code and a group, no name."""
+
+    __tablename__ = "participants"
+    __table_args__ = (UniqueConstraint("study_id", "code"), UniqueConstraint("user_id"))
+    id: Mapped[int] = mapped_column(primary_key=True)
+    study_id: Mapped[int] = mapped_column(ForeignKey("studies.id"), index=True)
+    user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
+    """Stands for the participant in logs; a user of its own in each study."""
+    code: Mapped[str] = mapped_column(String(20))
+    group: Mapped[str] = mapped_column(String(40))
+    row: Mapped[int]
+    """Of the Latin square."""
+    is_simulated: Mapped[bool] = mapped_column(default=False)
+    consented_at: Mapped[datetime | None]
+    finished_at: Mapped[datetime | None]
+    withdrawn_at: Mapped[datetime | None]
+    answers: Mapped[dict[str, Any] | None]
+    """To what the study asks."""
+    study: Mapped[Study] = relationship(back_populates="participants")
+    trials: Mapped[list["Trial"]] = relationship(order_by="Trial.place", back_populates="participant")
+
+
+class Trial(Base):
+    """One task that a participant is to do, in its place; the registration is that of the user."""
+
+    __tablename__ = "trials"
+    __table_args__ = (
+        UniqueConstraint("participant_id", "place"),
+        UniqueConstraint("participant_id", "task_id"),
+    )
+    id: Mapped[int] = mapped_column(primary_key=True)
+    participant_id: Mapped[int] = mapped_column(ForeignKey("participants.id"))
+    place: Mapped[int]
+    task_id: Mapped[int] = mapped_column(ForeignKey("tasks.id"), index=True)
+    is_practice: Mapped[bool]
+    participant: Mapped[Participant] = relationship(back_populates="trials")
+    task: Mapped[Task] = relationship()
+
+
+class OfflineSnap(Base):
+    """What a snap gives from a pose that an operator passed through, computed afterwards."""
+
+    __tablename__ = "offline_snaps"
+    __table_args__ = (UniqueConstraint("registration_id", "seconds", "config_hash"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    registration_id: Mapped[int] = mapped_column(ForeignKey("registrations.id"))
+    seconds: Mapped[float] = mapped_column(Float)
+    """Of the trace, where the pose was."""
+    T_world_object_start: Mapped[Pose]
+    config_hash: Mapped[str] = mapped_column(String(64))
+    """Of configuration, seed, frame and version: all that the result hangs on beside the pose."""
+    config: Mapped[dict[str, Any]]
+    seed: Mapped[int] = mapped_column(BigInteger)
+    T_world_object: Mapped[Pose | None]
+    """None where the snap failed."""
+    confidence: Mapped[float | None] = mapped_column(Float)
+    message: Mapped[str] = mapped_column(String(2000), default="")
+    snap_seconds: Mapped[float] = mapped_column(Float)
+    """As measured."""
+    evaluations: Mapped[int]
+    version: Mapped[str] = mapped_column(String(40))
+    hardware: Mapped[str] = mapped_column(String(200))
