@@ -14,6 +14,7 @@ from app.api import (
     exports,
     health,
     objects,
+    participation,
     placement,
     problems,
     registration_stream,
@@ -24,6 +25,7 @@ from app.api import (
     searches,
     sign_in,
     snaps,
+    studies,
     tasks,
     three_points,
     uncertainty,
@@ -41,6 +43,7 @@ from app.scene_data import SceneData
 from app.services import Services
 from app.snapping import Snapper, create_snapper
 from app.storage import FileStore
+from app.study.studies import Studies
 
 SECONDS_BETWEEN_CLEANINGS = 60.0
 
@@ -68,6 +71,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         desk=Desk(database, log, data, snapper),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
+        studies=Studies(database, data),
     )
 
 
@@ -114,6 +118,8 @@ def create_app(services: Services) -> FastAPI:
         searches,
         uncertainty,
         exports,
+        studies,
+        participation,
     ):
         app.include_router(module.router)
     app.include_router(replay_proxy.router)

@@ -12,6 +12,7 @@ from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.snapping import Snapper
 from app.storage import FileStore
+from app.study.studies import Studies
 
 
 @dataclass(frozen=True)
@@ -28,3 +29,4 @@ class Services:
     desk: Desk
     replays: Replays
     export_jobs: ExportJobs
+    studies: Studies
