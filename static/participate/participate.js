@@ -16,6 +16,16 @@ const TOOLS = {
 };
 const LINK_NEEDED = "Please open the link that was given to you: it leads to your study, and works as often as you like.";
 
+/** What goes into a screen before it is shown. */
+const FILL = {
+  consent: () => setText(byId("consent-text"), place.consent),
+  questions: () => byId("question-list").replaceChildren(...place.questions.map(questionField)),
+  break: () => setText(byId("break-text"), `${place.done} of ${place.total} tasks are done.`),
+  instructions: fillInstructions,
+  task: fillTask,
+  thanks: () => setText(byId("thanks-text"), `All ${place.total} tasks are done. You may close this page.`),
+};
+
 const message = messageArea(byId("message"));
 let place = null; // as the server tells it
 let screens = []; // that are still to be shown
@@ -77,8 +87,6 @@ function showNext() {
   else showScreen(screens[0]);
 }
 
-const taskUrl = () => `/label/${place.task.id}`;
-
 function showScreen(name) {
   FILL[name]?.();
   for (const screen of document.querySelectorAll(".screen")) screen.hidden = screen.id !== name;
@@ -87,15 +95,6 @@ function showScreen(name) {
   heading.tabIndex = -1;
   heading.focus();
 }
-
-const FILL = {
-  consent: () => setText(byId("consent-text"), place.consent),
-  questions: () => byId("question-list").replaceChildren(...place.questions.map(questionField)),
-  break: () => setText(byId("break-text"), `${place.done} of ${place.total} tasks are done.`),
-  instructions: fillInstructions,
-  task: fillTask,
-  thanks: () => setText(byId("thanks-text"), `All ${place.total} tasks are done. You may close this page.`),
-};
 
 function fillInstructions() {
   const { mode, condition, instructions } = place.task;
@@ -113,6 +112,10 @@ function fillTask() {
   byId("task-start").href = taskUrl();
 }
 
+function taskUrl() {
+  return `/label/${place.task.id}`;
+}
+
 function whatComes() {
   return place.task.is_practice ? "Practice, which does not count" : `Task ${place.done + 1} of ${place.total}`;
 }
@@ -128,8 +131,9 @@ function questionField({ text, choices }) {
   return element("fieldset", { className: "choices" }, element("legend", {}, text), ...options);
 }
 
-const sendAnswers = () =>
-  post("/api/participation/answers", { answers: Object.fromEntries(new FormData(byId("questions"))) });
+function sendAnswers() {
+  return post("/api/participation/answers", { answers: Object.fromEntries(new FormData(byId("questions"))) });
+}
 
 async function send(event, request) {
   event.preventDefault();

@@ -46,6 +46,14 @@ def set_up(page: Page, server: Server, name: str) -> str:
     return page.locator("#link-list code").inner_text()
 
 
+def scale_of_gizmo(page: Page) -> float:
+    """Of the task that the page shows, metres."""
+    root, _, task_id = page.url.rpartition("/label/")
+    task = page.request.get(f"{root}/api/tasks/{task_id}").json()
+    item = page.request.get(f"{root}/api/objects/{task['object']['id']}").json()
+    return 0.75 * float(item["diameter"])
+
+
 def do_task(page: Page, first_picture: str | None = None) -> str:
     """Move the object, submit it, and tell in which mode that was."""
     frame = view_frame(page)
@@ -55,11 +63,20 @@ def do_task(page: Page, first_picture: str | None = None) -> str:
         expect(page.locator("#clock-text")).to_have_text(CLOCK)
     else:
         expect(page.locator("#clock")).to_be_hidden()
-    for tool in ("snap", "place", "three-points", "find", "copy", "precision", "skip", "agreement", "confidence"):
+    for tool in (
+        "snap",
+        "place",
+        "three-points",
+        "find",
+        "copy",
+        "precision",
+        "skip",
+        "agreement",
+        "confidence",
+    ):
         expect(page.locator(f"#{tool}")).to_be_hidden()
-    scale = frame.evaluate("() => window.__viserMutable.nodeRefFromName['/object'].scale.x")
     wait_for_picture(frame)
-    drag(page, frame, Handle("tx", scale), 0.01)
+    drag(page, frame, Handle("tx", scale_of_gizmo(page)), 0.01)
     expect(page.locator("#undo")).to_be_enabled()
     if first_picture:
         take_picture(page, first_picture)
