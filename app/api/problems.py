@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from app.auth import SignInError, TooManyAttemptsError
 from app.labeling.desk import NotFoundError
 from app.labeling.track import ActionError
-from app.study.studies import StudyError
+from app.study.plan import StudyError
 
 logger = logging.getLogger(__name__)
 

@@ -7,8 +7,8 @@ from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
 from app.database import Database
-from app.study.plan import StudyPlan
-from app.study.studies import StudyError, require_taking_part
+from app.study.plan import StudyError, StudyPlan
+from app.study.studies import require_taking_part
 from app.tables import Participant, Registration, Task, Trial
 
 ScreenKind = Literal["consent", "questions", "practice", "break", "instructions", "task", "thanks"]

@@ -23,6 +23,10 @@ QUICKLY = (
 )
 
 
+class StudyError(ValueError):
+    """A study, its plan or its participants do not allow this; the message may be shown."""
+
+
 def _without_repetition(items: list[Item]) -> list[Item]:
     for index, item in enumerate(items):
         if item in items[:index]:

@@ -4,32 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
-import numpy as np
 from sqlalchemy import delete, func, select
-from sqlalchemy.orm import Session, joinedload, selectinload
+from sqlalchemy.orm import Session, joinedload
 
 from app.auth import Role, add_credential
 from app.database import Database
-from app.scene_data import SceneData, camera_of
-from app.start_pose import start_pose
+from app.scene_data import SceneData
 from app.study.erasing import erase_registrations
-from app.study.plan import Slot, StudyPlan, TaskRef, order_of
-from app.tables import (
-    Credential,
-    Object,
-    Participant,
-    Registration,
-    Scene,
-    Study,
-    Task,
-    Trial,
-    User,
-    utc_now,
-)
-
-
-class StudyError(ValueError):
-    """A study or participant does not allow this; the message may be shown."""
+from app.study.plan import Slot, StudyError, StudyPlan, order_of
+from app.study.tasks import ensure_task, find_task, start_of
+from app.tables import Credential, Participant, Registration, Study, Trial, User, utc_now
 
 
 @dataclass(frozen=True)
@@ -67,12 +51,12 @@ class Studies:
         Raises:
             StudyError: where the name is taken, or the plan names what is not there.
         """
-        starts = {ref: self._start(ref) for ref in [*plan.practice, *plan.tasks]}
+        starts = {ref: start_of(self._database, self._data, ref) for ref in [*plan.practice, *plan.tasks]}
         with self._database.write() as session:
             if session.scalar(select(Study.id).filter_by(name=name)) is not None:
                 raise StudyError(f"there already is a study named {name!r}; choose another name")
             for ref, mode, condition in product(starts, plan.modes, plan.conditions):
-                _add_task(session, Slot(ref, mode, condition), starts[ref])
+                ensure_task(session, Slot(ref, mode, condition), starts[ref])
             study = Study(
                 name=name,
                 plan=plan.model_dump(mode="json"),
@@ -87,7 +71,7 @@ class Studies:
     def check(self, plan: StudyPlan) -> None:
         """Raise `StudyError` where the plan names scenes or objects that are not there."""
         for ref in [*plan.practice, *plan.tasks]:
-            self._start(ref)
+            start_of(self._database, self._data, ref)
 
     def add_participant(self, study_id: int, group: str, is_simulated: bool = False) -> Joined:
         """Let one more operator take part, in the first row of their group that nobody holds.
@@ -106,32 +90,12 @@ class Studies:
             row = _free_row(study.participants, group)
             if row >= plan.groups[group]:
                 raise StudyError(f"the group {group!r} has all its {plan.groups[group]} operators")
-            code = f"P{len(study.participants) + 1:02d}"
-            user = User(name=f"study {study.id}, {code}", role=Role.PARTICIPANT)
-            session.add(user)
-            session.flush()
-            participant = Participant(
-                study_id=study.id,
-                user_id=user.id,
-                code=code,
-                group=group,
-                row=row,
-                is_simulated=is_simulated or study.is_simulated,
-            )
-            session.add(participant)
-            session.flush()
+            participant = _new_participant(session, study, group, row, is_simulated or study.is_simulated)
             for place, slot in enumerate(order_of(plan, row, study.seed)):
-                task = _existing_task(session, slot)
+                task = find_task(session, slot)
                 assert task is not None  # made with the study
-                session.add(
-                    Trial(
-                        participant_id=participant.id,
-                        place=place,
-                        task_id=task.id,
-                        is_practice=slot.is_practice,
-                    )
-                )
-            secret = add_credential(session, "participant", user.id, None)
+                participant.trials.append(Trial(place=place, task_id=task.id, is_practice=slot.is_practice))
+            secret = add_credential(session, "participant", participant.user_id, None)
         return Joined(participant, secret)
 
     def new_secret(self, participant_id: int) -> str:
@@ -216,36 +180,6 @@ class Studies:
         with self._database.read() as session:
             return [_standing(session, participant) for participant in _study(session, study_id).participants]
 
-    def _start(self, ref: TaskRef) -> "_Start":
-        """Where a task's object stands at its beginning."""
-        with self._database.read() as session:
-            scene = session.scalar(
-                select(Scene).where(Scene.id == ref.scene_id).options(selectinload(Scene.frames))
-            )
-            item = session.get(Object, ref.object_id)
-            if scene is None:
-                raise StudyError(f"there is no scene {ref.scene_id}; choose one of GET /api/scenes")
-            if item is None or item.dataset_id != scene.dataset_id:
-                raise StudyError(
-                    f"object {ref.object_id} is none of the dataset of scene {ref.scene_id};"
-                    f" choose one of GET /api/objects?dataset_id={scene.dataset_id}"
-                )
-            # of all that ask for this thing, the first: so all modes and conditions begin alike
-            same = session.scalar(select(Task).filter_by(**ref.model_dump()).order_by(Task.id).limit(1))
-        if same is not None:
-            return _Start(same.frame_id, same.T_world_object_start, same.T_world_object_reference)
-        frame = scene.frames[0]
-        T_world_camera = np.array(frame.T_world_camera)
-        T = start_pose(self._data.model(item), self._data.depth(frame), camera_of(frame), T_world_camera)
-        return _Start(frame.id, T.tolist(), None)
-
-
-@dataclass(frozen=True)
-class _Start:
-    frame_id: int
-    T_world_object_start: list[list[float]]
-    T_world_object_reference: list[list[float]] | None
-
 
 def require_taking_part(participant: Participant) -> None:
     """Raise `StudyError` unless the participant may go on; their study has to be loaded."""
@@ -269,24 +203,18 @@ def _participant(session: Session, participant_id: int) -> Participant:
     return participant
 
 
-def _existing_task(session: Session, slot: Slot) -> Task | None:
-    key = slot.task.model_dump() | {"mode": slot.mode, "condition": slot.condition}
-    return session.scalar(select(Task).filter_by(**key))
-
-
-def _add_task(session: Session, slot: Slot, start: _Start) -> None:
-    if _existing_task(session, slot) is None:
-        session.add(
-            Task(
-                **slot.task.model_dump(),
-                mode=slot.mode,
-                condition=slot.condition,
-                frame_id=start.frame_id,
-                T_world_object_start=start.T_world_object_start,
-                T_world_object_reference=start.T_world_object_reference,
-                is_for_studies=True,
-            )
-        )
+def _new_participant(session: Session, study: Study, group: str, row: int, is_simulated: bool) -> Participant:
+    """With a user of its own, who is known by nothing but the participant's code."""
+    code = f"P{len(study.participants) + 1:02d}"
+    user = User(name=f"study {study.id}, {code}", role=Role.PARTICIPANT)
+    session.add(user)
+    session.flush()
+    participant = Participant(
+        study_id=study.id, user_id=user.id, code=code, group=group, row=row, is_simulated=is_simulated
+    )
+    session.add(participant)
+    session.flush()
+    return participant
 
 
 def _free_row(participants: Sequence[Participant], group: str) -> int:

@@ -9,13 +9,17 @@ const SECOND_MS = 1000;
 export function trialPart(page) {
   let clockKey = null;
 
-  async function open(task) {
+  function open(task) {
     if (!page.isTrial()) return;
     for (const node of document.querySelectorAll("[data-ordinary]")) node.hidden = true;
     byId("trial").hidden = false;
     byId("trial").dataset.mode = task.mode;
     setText(byId("trial-mode"), task.mode === "quick" ? "As quickly as you can" : "As accurately as you can");
     if (task.mode === "quick") startClock(`snap6d.clock.${page.me().id}.${task.id}`);
+    showPlace().catch(page.message.problem);
+  }
+
+  async function showPlace() {
     const { done, total, task: next } = await get("/api/participation");
     setText(byId("trial-place"), next?.is_practice ? "Practice" : `Task ${Math.min(done + 1, total)} of ${total}`);
   }

@@ -5,8 +5,7 @@ from sqlalchemy import func, select
 
 from app.auth import Actor, Auth, SignInError
 from app.event_log import EventLog, NewEvent
-from app.study.plan import StudyPlan, order_of
-from app.study.studies import StudyError
+from app.study.plan import StudyError, StudyPlan, order_of
 from app.tables import Registration, Scene, Task, Trial
 
 
