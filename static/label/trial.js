@@ -7,7 +7,8 @@ const SECOND_MS = 1000;
 
 /** A part of the labelling page. */
 export function trialPart(page) {
-  let clockKey = null;
+  let clockKey = null; // under which the time used is kept
+  let viewIsThere = false;
 
   function open(task) {
     if (!page.isTrial()) return;
@@ -15,7 +16,8 @@ export function trialPart(page) {
     byId("trial").hidden = false;
     byId("trial").dataset.mode = task.mode;
     setText(byId("trial-mode"), task.mode === "quick" ? "As quickly as you can" : "As accurately as you can");
-    if (task.mode === "quick") startClock(`snap6d.clock.${page.me().id}.${task.id}`);
+    if (task.mode === "quick") clockKey = `snap6d.clock.${page.me().id}.${task.id}`;
+    startClock();
     showPlace().catch(page.message.problem);
   }
 
@@ -24,9 +26,9 @@ export function trialPart(page) {
     setText(byId("trial-place"), next?.is_practice ? "Practice" : `Task ${Math.min(done + 1, total)} of ${total}`);
   }
 
-  /** Counts the time on this page; who comes back later goes on with what they had used. */
-  function startClock(key) {
-    clockKey = key;
+  /** Counts from when the scene is there; who comes back later goes on with what they had used. */
+  function startClock() {
+    if (clockKey === null || !viewIsThere || !byId("clock").hidden) return;
     byId("clock").hidden = false;
     showClock();
     setInterval(() => {
@@ -43,11 +45,16 @@ export function trialPart(page) {
     setText(byId("clock-text"), `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`);
   }
 
+  function attach() {
+    viewIsThere = true;
+    startClock();
+  }
+
   function draw({ state }, before) {
     if (!page.isTrial() || state === "open" || before?.state === state) return;
     if (clockKey) localStorage.removeItem(clockKey);
     location.assign("/participate?go-on");
   }
 
-  return { open, draw };
+  return { open, attach, draw };
 }
