@@ -28,6 +28,7 @@ from sqlalchemy.orm import (
 )
 
 Pose = list[list[float]]
+Mode = Literal["accurate", "quick"]
 Condition = Literal["manual", "snap", "auto", "three points", "click-to-place", "live snap", "find it"]
 """What a task may be done with: no machine, one that is asked, one that does more when it is sure; or, where
 studies compare techniques, the gizmo, Snap, and this one."""
@@ -165,6 +166,8 @@ class Task(Base):
     frame_id: Mapped[int] = mapped_column(ForeignKey("frames.id"))
     T_world_object_start: Mapped[Pose]
     T_world_object_reference: Mapped[Pose | None]
+    is_for_studies: Mapped[bool] = mapped_column(default=False)
+    """Only studies ask for it: nobody else is shown it."""
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     scene: Mapped[Scene] = relationship()
     object: Mapped[Object] = relationship()

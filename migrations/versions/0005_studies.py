@@ -1,4 +1,4 @@
-"""Studies: participants, their trials, and snaps that are computed afterwards."""
+"""Studies: participants, their trials and tasks, and snaps that are computed afterwards."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -9,6 +9,9 @@ down_revision = "0004"
 
 def upgrade() -> None:
     """Apply."""
+    op.add_column(
+        "tasks", sa.Column("is_for_studies", sa.Boolean(), nullable=False, server_default=sa.false())
+    )
     op.create_table(
         "studies",
         sa.Column("id", sa.Integer(), nullable=False),
