@@ -6,7 +6,8 @@ and the rest comes out the same, for a snap's seed hangs on its input alone.
 
 import uuid
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby, islice
@@ -93,10 +94,11 @@ class OfflineBatch:
             self._store.add(copies)
         done = total - sum(map(len, unknown))
         on_progress(done, total)
-        for inputs, result in self._computed(unknown):
-            self._store.add(self._snaps(inputs, result))
-            done += sum(map(len, inputs))
-            on_progress(done, total)
+        with closing(self._computed(unknown)) as results:
+            for inputs, result in results:
+                self._store.add(self._snaps(inputs, result))
+                done += sum(map(len, inputs))
+                on_progress(done, total)
         return Summary(total, len(unknown), self._store.failures(registration_ids))
 
     def _missing(self, registration_ids: Sequence[int]) -> tuple[int, list[Input]]:
@@ -111,7 +113,7 @@ class OfflineBatch:
                     inputs[sample.input_hash].append(sample)
         return total, sorted(inputs.values(), key=_view_of)
 
-    def _computed(self, inputs: Sequence[Input]) -> Iterator[tuple[Sequence[Input], BatchResult]]:
+    def _computed(self, inputs: Sequence[Input]) -> Generator[tuple[Sequence[Input], BatchResult]]:
         """Results as they come; whatever ends this takes what is under way back from the workers."""
         self._snapper.wait_until_ready()
         batches, ended = _batches(inputs), SimpleQueue[Ended]()
