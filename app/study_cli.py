@@ -11,7 +11,6 @@ from app.terminal import checked_database, console, fail, progress_bar, read_set
 
 if TYPE_CHECKING:
     from app.database import Database
-    from app.study.plan import StudyPlan
     from app.study.simulation import Workplace
     from app.tables import Study
 
@@ -49,16 +48,19 @@ def list_studies() -> None:
 def simulate_study(
     name: Annotated[str, typer.Argument(metavar="STUDY", help="Its name; a study that stopped goes on.")],
     operators: Annotated[int, typer.Option(min=1, max=500, help="Novices, and as many experts.")] = 8,
-    scenes: Annotated[int, typer.Option(min=1, help="The first object of each of so many scenes.")] = 4,
+    scenes: Annotated[int, typer.Option(min=1, help="With known poses; of all datasets in turn.")] = 4,
     seed: Annotated[int, typer.Option(min=0, help="Of the order of tasks, and of the operators.")] = 0,
 ) -> None:
     """Make a study, or go on with it: simulated operators, novices and experts, do all of it by hand."""
-    from app.study.simulation import create_simulated, simulate
+    from app.study.plan import StudyPlan
+    from app.study.simulation import create_simulated, known_tasks, simulate
 
     with _workplace() as workplace:
         study = _find(workplace.database, name)
         if study is None:
-            plan = _plan(workplace.database, operators, scenes)
+            tasks = known_tasks(workplace.database, scenes)
+            groups = {"novice": operators, "expert": operators}
+            plan = StudyPlan.model_validate({"groups": groups, "tasks": tasks})
             study = create_simulated(workplace, name, plan, seed, _owner(workplace.database))
         elif not study.is_simulated:
             fail(f"the study {name!r} is one of people; choose another name")
@@ -175,22 +177,3 @@ def _owner(database: "Database") -> int:
     from app.auth import LOCAL_ADMINISTRATOR, Auth, Role
 
     return Auth(database).ensure_user(LOCAL_ADMINISTRATOR, Role.ADMIN).id
-
-
-def _plan(database: "Database", operators: int, scenes: int) -> "StudyPlan":
-    """The first object whose pose is known, in each of the first scenes that have one."""
-    from sqlalchemy import select
-
-    from app.study.plan import StudyPlan, TaskRef
-    from app.tables import Task
-
-    query = select(Task).where(Task.T_world_object_reference.is_not(None)).order_by(Task.scene_id, Task.id)
-    firsts: dict[int, TaskRef] = {}
-    with database.read() as session:
-        for task in session.scalars(query):
-            ref = TaskRef(scene_id=task.scene_id, object_id=task.object_id, instance=task.instance)
-            firsts.setdefault(task.scene_id, ref)
-    if len(firsts) < scenes:
-        fail(f"{scenes} scenes with an object of known pose are needed; there are {len(firsts)}")
-    groups = {"novice": operators, "expert": operators}
-    return StudyPlan.model_validate({"groups": groups, "tasks": list(firsts.values())[:scenes]})

@@ -23,6 +23,7 @@ from benchmarks import (
     registration,
     snap,
     startup,
+    study,
     techniques,
 )
 from benchmarks.figures import Figure, table
@@ -39,6 +40,7 @@ BENCHMARKS = {
     "registration": registration,
     "ablation": ablation,
     "known": known,
+    "study": study,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""

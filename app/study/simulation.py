@@ -4,8 +4,10 @@ Whatever they do is marked: the study and its participants are simulated, and th
 the server that is named so (`SimulatedClock.boot_id`).
 """
 
+from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import chain, islice, zip_longest
 from typing import cast
 
 import numpy as np
@@ -18,7 +20,7 @@ from app.event_log import EventLog
 from app.labeling.desk import Desk
 from app.scene_data import SceneData
 from app.snapping import Snapper
-from app.study.plan import StudyPlan
+from app.study.plan import StudyPlan, TaskRef
 from app.study.simulated_operator import CARES, HANDS, SimulatedClock, SimulatedOperator
 from app.study.studies import Studies
 from app.tables import Event, Mode, Participant, Registration, Study, Task, Trial
@@ -42,6 +44,35 @@ class Workplace:
     def studies(self) -> Studies:
         """The studies of the database."""
         return Studies(self.database, self.data)
+
+
+def known_tasks(database: Database, scenes: int) -> list[TaskRef]:
+    """An object of known pose in each of so many scenes, of all datasets in turn; not one that was chosen
+    before, where the scene has another one.
+
+    Raises:
+        SimulationError: where there are too few such scenes.
+    """
+    query = (
+        select(Task)
+        .where(Task.T_world_object_reference.is_not(None))
+        .order_by(Task.scene_id, Task.object_id, Task.instance)
+        .options(joinedload(Task.scene))
+    )
+    datasets: dict[int, dict[int, list[Task]]] = defaultdict(lambda: defaultdict(list))
+    with database.read() as session:
+        for task in session.scalars(query):
+            datasets[task.scene.dataset_id][task.scene_id].append(task)
+    in_turn = chain.from_iterable(zip_longest(*(by_scene.values() for by_scene in datasets.values())))
+    chosen: list[Task] = []
+    for tasks in islice(filter(None, in_turn), scenes):
+        before = {task.object_id for task in chosen}
+        chosen.append(next((task for task in tasks if task.object_id not in before), tasks[0]))
+    if len(chosen) < scenes:
+        raise SimulationError(
+            f"{scenes} scenes with an object of known pose are needed; there are {len(chosen)}"
+        )
+    return [TaskRef(scene_id=one.scene_id, object_id=one.object_id, instance=one.instance) for one in chosen]
 
 
 def create_simulated(workplace: Workplace, name: str, plan: StudyPlan, seed: int, user_id: int) -> Study:
