@@ -1,9 +1,8 @@
-"""The report of a study: from the database to curves, and to files."""
+"""The report of a study: from the database to curves and all that is read off them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 
@@ -69,27 +68,6 @@ def report_of(collected: Collected, config: ReportConfig) -> Report:
         comparisons=comparisons(trials, config.timing, config.seed),
         remarks=[*collected.remarks, *_never_within(trials)],
     )
-
-
-def write_report(report: Report, folder: Path) -> list[Path]:
-    """Write figure, tables and the one-file page into a folder, the same bytes for the same log.
-
-    Returns:
-        The files.
-    """
-    from app.analysis.figure import figure_bytes  # matplotlib takes a second to import
-    from app.analysis.page import page_of
-    from app.analysis.tables import tables_of, write_tables
-
-    folder.mkdir(parents=True, exist_ok=True)
-    contents = {
-        "figure.svg": figure_bytes(report, "svg"),
-        "figure.pdf": figure_bytes(report, "pdf"),
-        "report.html": page_of(report).encode(),
-    }
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
-    return [*(folder / name for name in contents), *write_tables(tables_of(report), folder)]
 
 
 def _order(collected: Collected):  # type: ignore[no-untyped-def] # a key function
