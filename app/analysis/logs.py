@@ -68,7 +68,7 @@ def read_logs(database: Database, registration_ids: Sequence[int]) -> Iterator[t
                 yield (
                     registration_id,
                     [
-                        LoggedRow(*plain, decoded_pose(T_after), decoded_pose(path), detail)
+                        LoggedRow._make((*plain, decoded_pose(T_after), decoded_pose(path), detail))
                         for _, *plain, T_after, path, detail in rows
                     ],
                 )

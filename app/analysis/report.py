@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
 
@@ -68,6 +69,21 @@ def report_of(collected: Collected, config: ReportConfig) -> Report:
         comparisons=comparisons(trials, config.timing, config.seed),
         remarks=[*collected.remarks, *_never_within(trials)],
     )
+
+
+def write_report(report: Report, folder: Path) -> list[Path]:
+    """Write figure, tables and the one-file page into a folder, the same bytes for the same log.
+
+    Returns:
+        The files.
+    """
+    from app.analysis.report_files import file_names, file_of  # what draws takes a second to import
+
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / name for name in file_names()]
+    for path in paths:
+        path.write_bytes(file_of(report, path.name))
+    return paths
 
 
 def _order(collected: Collected):  # type: ignore[no-untyped-def] # a key function

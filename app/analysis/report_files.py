@@ -1,7 +1,5 @@
 """The files of a report."""
 
-from pathlib import Path
-
 from app.analysis.figure import figure_bytes
 from app.analysis.page import page_of
 from app.analysis.report import Report
@@ -23,16 +21,3 @@ def file_of(report: Report, name: str) -> bytes:
         return figure_bytes(report, "svg" if suffix == "svg" else "pdf")
     table = table_of(report, stem)
     return csv_bytes(table) if suffix == "csv" else parquet_bytes(table)
-
-
-def write_report(report: Report, folder: Path) -> list[Path]:
-    """Write figure, tables and the one-file page into a folder, the same bytes for the same log.
-
-    Returns:
-        The files.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / name for name in file_names()]
-    for path in paths:
-        path.write_bytes(file_of(report, path.name))
-    return paths
