@@ -15,6 +15,8 @@ from sqlalchemy.orm import Session
 from app.database import Database
 from app.tables import Credential, User, utc_now
 
+LOCAL_ADMINISTRATOR = "admin"
+"""Whoever runs commands on the machine of the server."""
 LOGIN_LIFETIME = timedelta(days=14)
 LINK_LIFETIME = timedelta(hours=12)
 FREE_ATTEMPTS = 5
@@ -24,8 +26,12 @@ SHORTEST_PASSWORD = 8
 
 
 class Role(StrEnum):
-    """What a user may do; each role may do all that the ones before it may."""
+    """What a user may do; each role may do all that the ones before it may.
 
+    A participant does the tasks of one study and knows of nothing else.
+    """
+
+    PARTICIPANT = "participant"
     OPERATOR = "operator"
     REVIEWER = "reviewer"
     ADMIN = "admin"
@@ -145,7 +151,22 @@ class Auth:
             if link is None:
                 raise SignInError("this sign-in link was used before or is too old; ask for a new one")
             session.delete(link)
-            return _add_credential(session, "session", link.user_id, LOGIN_LIFETIME)
+            return add_credential(session, "session", link.user_id, LOGIN_LIFETIME)
+
+    def sign_in_to_study(self, secret: str) -> str:
+        """A new login session's secret for a participant's link, which can be used again.
+
+        Raises:
+            SignInError: where the link is unknown, the participant has withdrawn, or the study is closed.
+        """
+        with self._database.write() as session:
+            link = _find_credential(session, "participant", secret)
+            if link is None:
+                raise SignInError(
+                    "this link is not valid: the study is closed, you have withdrawn, or there is a newer"
+                    " link; ask whoever gave it to you"
+                )
+            return add_credential(session, "session", link.user_id, LOGIN_LIFETIME)
 
     def sign_out(self, secret: str) -> None:
         """End a login session."""
@@ -178,7 +199,7 @@ class Auth:
 
     def _issue(self, kind: str, user_id: int, lifetime: timedelta | None, name: str = "") -> str:
         with self._database.write() as session:
-            return _add_credential(session, kind, user_id, lifetime, name)
+            return add_credential(session, kind, user_id, lifetime, name)
 
 
 class _Throttle:
@@ -226,10 +247,10 @@ def _find_credential(session: Session, kind: str, secret: str) -> Credential | N
     return credential
 
 
-def _add_credential(
+def add_credential(
     session: Session, kind: str, user_id: int, lifetime: timedelta | None, name: str = ""
 ) -> str:
-    """The secret of a new credential; those that have expired are cleared away."""
+    """The secret of a new credential, within a transaction; those that have expired are cleared away."""
     secret = secrets.token_urlsafe(32)
     session.execute(delete(Credential).where(Credential.expires_at < utc_now()))
     session.add(

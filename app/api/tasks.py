@@ -24,13 +24,12 @@ from app.api.registration_state import RegistrationOut, registration_out
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose
-from app.tables import Condition, Frame, Object, Registration, Scene, Task
+from app.tables import Condition, Frame, Mode, Object, Registration, Scene, Task
 from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 
 TaskState = Literal["open", "in_progress", "submitted", "skipped"]
-Mode = Literal["accurate", "quick"]
 
 
 class NewTask(BaseModel):

@@ -236,6 +236,7 @@ class Desk:
             skip_reason=registration.skip_reason,
             known_objects=lambda: neighbours.known,
             request_search=request_search,
+            now=self._log.clock.monotonic,
         )
 
         def depth_view(frame_id: int) -> DepthView:

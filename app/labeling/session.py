@@ -91,6 +91,7 @@ class LabelingSession:
         request_search: Hands a search to the workers.
         skip_reason: Why it was skipped, where it was.
         known_objects: Tells what is known of other objects in the scene.
+        now: Tells the seconds that the paths of drags are written down with.
     """
 
     def __init__(
@@ -108,12 +109,14 @@ class LabelingSession:
         request_search: RequestSearch,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self.registration_id = registration_id
         self._state = state
         self._skip_reason = skip_reason
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
+        self._now = now
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
             registration_id, self._track, condition, same_pose, self._request_from_workers, known_objects
@@ -185,7 +188,7 @@ class LabelingSession:
         with self._lock:
             if not self._is_open:
                 return
-            self._track.drag = Drag(self._track.history.current.T_world_object, self._gizmo_axes)
+            self._track.drag = Drag(self._track.history.current.T_world_object, self._gizmo_axes, self._now)
             self._changed()
 
     def drag_to(self, T_world_object: Array) -> None:

@@ -1,4 +1,4 @@
-"""Studies: participants, their trials, and snaps that are computed afterwards."""
+"""Studies: participants, their trials and tasks, and snaps that are computed afterwards."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -9,6 +9,9 @@ down_revision = "0004"
 
 def upgrade() -> None:
     """Apply."""
+    op.add_column(
+        "tasks", sa.Column("is_for_studies", sa.Boolean(), nullable=False, server_default=sa.false())
+    )
     op.create_table(
         "studies",
         sa.Column("id", sa.Integer(), nullable=False),
@@ -63,7 +66,7 @@ def upgrade() -> None:
         sa.Column("registration_id", sa.Integer(), nullable=False),
         sa.Column("seconds", sa.Float(), nullable=False),
         sa.Column("T_world_object_start", sa.JSON(none_as_null=True), nullable=False),
-        sa.Column("config_hash", sa.String(length=64), nullable=False),
+        sa.Column("input_hash", sa.String(length=64), nullable=False),
         sa.Column("config", sa.JSON(none_as_null=True), nullable=False),
         sa.Column("seed", sa.BigInteger(), nullable=False),
         sa.Column("T_world_object", sa.JSON(none_as_null=True), nullable=True),
@@ -75,5 +78,6 @@ def upgrade() -> None:
         sa.Column("hardware", sa.String(length=200), nullable=False),
         sa.ForeignKeyConstraint(["registration_id"], ["registrations.id"]),
         sa.PrimaryKeyConstraint("id"),
-        sa.UniqueConstraint("registration_id", "seconds", "config_hash"),
+        sa.UniqueConstraint("registration_id", "seconds", "input_hash"),
     )
+    op.create_index("ix_offline_snaps_input_hash", "offline_snaps", ["input_hash"])

@@ -39,6 +39,13 @@ def age(database: Database, kind: str) -> None:
 def test_each_role_may_do_what_the_ones_before_it_may():
     table = {(a, b): a.includes(b) for a in Role for b in Role}
     assert table == {
+        (Role.PARTICIPANT, Role.PARTICIPANT): True,
+        (Role.PARTICIPANT, Role.OPERATOR): False,
+        (Role.PARTICIPANT, Role.REVIEWER): False,
+        (Role.PARTICIPANT, Role.ADMIN): False,
+        (Role.OPERATOR, Role.PARTICIPANT): True,
+        (Role.REVIEWER, Role.PARTICIPANT): True,
+        (Role.ADMIN, Role.PARTICIPANT): True,
         (Role.OPERATOR, Role.OPERATOR): True,
         (Role.OPERATOR, Role.REVIEWER): False,
         (Role.OPERATOR, Role.ADMIN): False,

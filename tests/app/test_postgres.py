@@ -18,6 +18,7 @@ from app.database import Database
 from app.importing import import_dataset
 from app.main import create_services
 from app.storage import FileStore
+from app.study.erasing import erase_registrations
 from tests.app.waiting import wait_until
 
 
@@ -51,7 +52,15 @@ def postgres_url() -> Iterator[str]:
         shutil.rmtree(folder)
 
 
-def test_a_registration_on_postgresql(postgres_url: str, demo: Path, cluster: str, tmp_path: Path) -> None:
+def refuses_changes(database: Database) -> None:
+    for statement in ("DELETE FROM events", "UPDATE estimates SET seed = 0", "TRUNCATE events"):
+        with pytest.raises(DBAPIError, match="append-only"), database.write() as session:
+            session.execute(text(statement))
+
+
+def test_a_registration_on_postgresql_and_its_erasing(
+    postgres_url: str, demo: Path, cluster: str, tmp_path: Path
+) -> None:
     database = Database(postgres_url)
     database.migrate()
     database.migrate()
@@ -75,9 +84,11 @@ def test_a_registration_on_postgresql(postgres_url: str, demo: Path, cluster: st
         assert kinds == ["opened", "snap_requested", "snap_applied", "submit"]
         again = services.desk.start(1, identity)
         assert np.allclose(again.session.snapshot().T_world_object, seat.session.snapshot().T_world_object)
-        for statement in ("DELETE FROM events", "UPDATE estimates SET seed = 0", "TRUNCATE events"):
-            with pytest.raises(DBAPIError, match="append-only"), services.database.write() as session:
-                session.execute(text(statement))
+        refuses_changes(services.database)
+        with services.database.write() as session:
+            erase_registrations(session, identity.user_id)
+        assert services.log.events(seat.registration.id) == []
+        refuses_changes(services.database)
     finally:
         services.desk.close()
         services.export_jobs.close()

@@ -1,0 +1,1 @@
+"""Studies: their plan, their course, simulated operators, and snaps computed afterwards."""

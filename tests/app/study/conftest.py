@@ -1,0 +1,42 @@
+"""Fixtures: studies of the small dataset."""
+
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from app.auth import Auth, Role
+from app.database import Database
+from app.importing import import_dataset
+from app.scene_data import SceneData
+from app.storage import FileStore
+from app.study.plan import StudyPlan, TaskRef
+from app.study.studies import Studies
+from app.tables import Task, User
+
+
+@pytest.fixture
+def studies(database: Database, files: FileStore, demo: Path) -> Studies:
+    """Of a database into which the small dataset was imported."""
+    import_dataset(database, files, demo)
+    return Studies(database, SceneData(files))
+
+
+@pytest.fixture
+def admin(database: Database, studies: Studies) -> User:
+    """Whoever sets studies up."""
+    return Auth(database).create_user("root", Role.ADMIN)
+
+
+@pytest.fixture
+def plan(database: Database, studies: Studies) -> StudyPlan:
+    """Two tasks and one for practice; one novice, two experts."""
+    with database.read() as session:
+        found = session.scalars(select(Task).order_by(Task.id)).all()
+    refs = [TaskRef(scene_id=t.scene_id, object_id=t.object_id, instance=t.instance) for t in found]
+    return StudyPlan(
+        tasks=refs[:2],
+        practice=refs[2:3],
+        groups={"novice": 1, "expert": 2},
+        questions=[{"text": "Have you used a 3-D program?", "choices": ["yes", "no"]}],
+    )
