@@ -8,6 +8,7 @@ import httpx
 from fastapi import FastAPI
 
 from app import __version__, pages
+from app.analysis.kept import Kept
 from app.api import (
     copies,
     datasets,
@@ -19,12 +20,14 @@ from app.api import (
     registration_stream,
     registrations,
     replay,
+    reports,
     scene_things,
     scenes,
     searches,
     sign_in,
     snaps,
     tasks,
+    team_reports,
     three_points,
     uncertainty,
 )
@@ -68,6 +71,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         desk=Desk(database, log, data, snapper),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
+        kept=Kept(database),
     )
 
 
@@ -114,6 +118,8 @@ def create_app(services: Services) -> FastAPI:
         searches,
         uncertainty,
         exports,
+        team_reports,
+        reports,
     ):
         app.include_router(module.router)
     app.include_router(replay_proxy.router)

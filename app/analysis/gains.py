@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.analysis.bootstrap import Interval, interval
+from app.analysis.remarks import counted
 from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
+from app.analysis.units import interval_told, told
 
 MOMENTS = ("at the end", "all along")
 """From the final pose; from all sampled poses, each trial counting with its mean."""
@@ -43,6 +45,17 @@ def gains(trials: Sequence[TrialTrace], seed: int) -> list[Gain]:
     """Of trials of one group, mode and condition: for both errors, at the end and all along."""
     with_stg = [trial for trial in trials if trial.has_stg]
     return [_gain(with_stg, kind, moment, seed) for kind in ERROR_KINDS for moment in MOMENTS if with_stg]
+
+
+def rotation_answers(gains: Sequence[Gain]) -> list[str]:
+    """Whether a snap improves rotation, group by group, in sentences."""
+    return [
+        f"{gain.group}, {gain.mode}, {gain.condition}, {gain.moment}: {gain.verdict}; rotation error"
+        f" {told(gain.before.mean, 'rotation')} before and {told(gain.after.mean, 'rotation')} after,"
+        f" gain {interval_told(gain.gain, 'rotation')} over {counted(gain.gain.operators, 'operator')}."
+        for gain in gains
+        if gain.error == "rotation"
+    ]
 
 
 def _gain(trials: Sequence[TrialTrace], kind: ErrorKind, moment: str, seed: int) -> Gain:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import groupby
 from operator import itemgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 from sqlalchemy import Text, cast, select
@@ -29,6 +29,12 @@ class LoggedRow(NamedTuple):
     snap_id: str | None
     T_after: Pose | None
     path: list[list[float]] | None
+    detail_text: str
+
+    @property
+    def detail(self) -> dict[str, Any]:
+        """What else was written down; decoded where it is asked for."""
+        return msgspec.json.decode(self.detail_text)
 
 
 COLUMNS = (
@@ -43,6 +49,7 @@ COLUMNS = (
     Event.snap_id,
     cast(Event.T_after, Text),
     cast(Event.path, Text),
+    cast(Event.detail, Text),
 )
 
 
@@ -58,35 +65,15 @@ def read_logs(database: Database, registration_ids: Sequence[int]) -> Iterator[t
         )
         with database.read() as session:
             for registration_id, rows in groupby(session.execute(query), key=itemgetter(0)):
-                yield registration_id, [_decoded(*row[1:]) for row in rows]
+                yield (
+                    registration_id,
+                    [
+                        LoggedRow._make((*plain, decoded_pose(T_after), decoded_pose(path), detail))
+                        for _, *plain, T_after, path, detail in rows
+                    ],
+                )
 
 
 def decoded_pose(text: str | None) -> Pose | None:
     """A pose of a JSON column that was read as text: many times as quick as through the column's type."""
     return None if text is None else msgspec.json.decode(text)
-
-
-def _decoded(
-    sequence: int,
-    kind: str,
-    actor: str,
-    utc: datetime,
-    monotonic_seconds: float,
-    boot_id: str,
-    duration_seconds: float | None,
-    snap_id: str | None,
-    T_after: str | None,
-    path: str | None,
-) -> LoggedRow:
-    return LoggedRow(
-        sequence,
-        kind,
-        actor,
-        utc,
-        monotonic_seconds,
-        boot_id,
-        duration_seconds,
-        snap_id,
-        decoded_pose(T_after),
-        decoded_pose(path),
-    )

@@ -5,11 +5,11 @@ from html import escape
 
 from app.analysis.bootstrap import RESAMPLES, Interval
 from app.analysis.figure import figure_bytes
+from app.analysis.gains import rotation_answers
 from app.analysis.pose_errors import PoseErrors
 from app.analysis.remarks import counted
 from app.analysis.report import Report
-from app.analysis.trial import ErrorKind
-from app.analysis.units import told
+from app.analysis.units import interval_told, told
 
 STYLE = """
 :root { color-scheme: light dark; --line: #d9dad6; --soft: #f4f4f1; }
@@ -33,7 +33,7 @@ def page_of(report: Report) -> str:
         _simulated(report),
         f"<p>{_counts(report)}</p>",
         f"<figure>{svg[svg.index('<svg') :]}</figure>",
-        _section("Does a snap improve rotation as well?", rotation_answers(report), _gains(report)),
+        _section("Does a snap improve rotation as well?", rotation_answers(report.gains), _gains(report)),
         _section("Hand-off", [], _hand_offs(report)),
         _section("Fitts' law: time = a + b log2(D/W + 1)", [], _fitts(report)),
         _section("Conditions in pairs", [], _comparisons(report)),
@@ -47,28 +47,6 @@ def page_of(report: Report) -> str:
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
         f"<style>{STYLE}</style>\n</head>\n<body>\n" + "\n".join(filter(None, parts)) + "\n</body>\n</html>\n"
     )
-
-
-def rotation_answers(report: Report) -> list[str]:
-    """Whether a snap improves rotation, group by group, in sentences."""
-    return [
-        f"{gain.group}, {gain.mode}, {gain.condition}, {gain.moment}: {gain.verdict}; rotation error"
-        f" {told(gain.before.mean, 'rotation')} before and {told(gain.after.mean, 'rotation')} after,"
-        f" gain {interval_told(gain.gain, 'rotation')} over {counted(gain.gain.operators, 'operator')}."
-        for gain in report.gains
-        if gain.error == "rotation"
-    ]
-
-
-def interval_told(interval: Interval, error: ErrorKind | None) -> str:
-    """ "4.2 mm (3.9 mm to 4.6 mm)"; seconds where it is of no error."""
-
-    def one(value: float) -> str:
-        return told(value, error) if error else f"{value:.3g} s"
-
-    if interval.operators < 2:
-        return one(interval.mean)
-    return f"{one(interval.mean)} ({one(interval.low)} to {one(interval.high)})"
 
 
 def _simulated(report: Report) -> str:

@@ -1,4 +1,4 @@
-"""The report of a study: from the database to curves, and to files."""
+"""The report of a study: from the database to curves and all that is read off them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -77,19 +77,13 @@ def write_report(report: Report, folder: Path) -> list[Path]:
     Returns:
         The files.
     """
-    from app.analysis.figure import figure_bytes  # matplotlib takes a second to import
-    from app.analysis.page import page_of
-    from app.analysis.tables import tables_of, write_tables
+    from app.analysis.report_files import file_names, file_of  # what draws takes a second to import
 
     folder.mkdir(parents=True, exist_ok=True)
-    contents = {
-        "figure.svg": figure_bytes(report, "svg"),
-        "figure.pdf": figure_bytes(report, "pdf"),
-        "report.html": page_of(report).encode(),
-    }
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
-    return [*(folder / name for name in contents), *write_tables(tables_of(report), folder)]
+    paths = [folder / name for name in file_names()]
+    for path in paths:
+        path.write_bytes(file_of(report, path.name))
+    return paths
 
 
 def _order(collected: Collected):  # type: ignore[no-untyped-def] # a key function

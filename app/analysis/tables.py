@@ -3,7 +3,6 @@
 import io
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -134,11 +133,6 @@ SCHEMAS: Mapping[str, pa.Schema] = {
 }
 
 
-def tables_of(report: Report) -> dict[str, pa.Table]:
-    """All tables of a report, by name."""
-    return {name: table_of(report, name) for name in SCHEMAS}
-
-
 def table_of(report: Report, name: str) -> pa.Table:
     """One table of a report, of those in `SCHEMAS`."""
     simulated = {"is_simulated": report.collected.is_simulated}
@@ -158,17 +152,6 @@ def parquet_bytes(table: pa.Table) -> bytes:
     sink = io.BytesIO()
     pq.write_table(table, sink, compression="zstd")
     return sink.getvalue()
-
-
-def write_tables(tables: Mapping[str, pa.Table], folder: Path) -> list[Path]:
-    """Write each table as CSV and as Parquet."""
-    written = []
-    for name, table in tables.items():
-        for suffix, content in (("csv", csv_bytes(table)), ("parquet", parquet_bytes(table))):
-            path = folder / f"{name}.{suffix}"
-            path.write_bytes(content)
-            written.append(path)
-    return written
 
 
 def _rounded(value: Any) -> Any:

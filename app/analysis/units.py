@@ -1,7 +1,8 @@
-"""Errors as people read them: millimetres and degrees."""
+"""Numbers as people read them: millimetres, degrees and seconds."""
 
 import math
 
+from app.analysis.bootstrap import Interval
 from app.analysis.trial import ErrorKind
 
 UNITS: dict[ErrorKind, str] = {"translation": "mm", "rotation": "°"}
@@ -18,3 +19,14 @@ def told(value: float, kind: ErrorKind) -> str:
         return "–"
     number = f"{in_people_units(value, kind):.3g}"
     return f"{number} mm" if kind == "translation" else f"{number}°"
+
+
+def interval_told(interval: Interval, error: ErrorKind | None) -> str:
+    """ "4.2 mm (3.9 mm to 4.6 mm)"; seconds where it is of no error."""
+
+    def one(value: float) -> str:
+        return told(value, error) if error else f"{value:.3g} s"
+
+    if interval.operators < 2:
+        return one(interval.mean)
+    return f"{one(interval.mean)} ({one(interval.low)} to {one(interval.high)})"

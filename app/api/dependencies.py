@@ -81,6 +81,7 @@ def at_least(role: Role) -> Callable[[Identity], Identity]:
 
 ServicesDep = Annotated[Services, Depends(get_services)]
 IdentityDep = Annotated[Identity, Depends(signed_in)]
+ReviewerDep = Annotated[Identity, Depends(at_least(Role.REVIEWER))]
 AdminDep = Annotated[Identity, Depends(at_least(Role.ADMIN))]
 LimitDep = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="Most items to return.")]
 AfterDep = Annotated[int, Query(ge=0, le=2**31 - 1, description="`next` of the page before.")]

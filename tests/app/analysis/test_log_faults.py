@@ -19,6 +19,7 @@ def rows_of(*entries: Entry, skip: int = 0) -> list[LoggedRow]:
             None,
             None,
             None,
+            "{}",
         )
         for i, entry in enumerate(entries)
     ]
