@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 from sqlalchemy import select
-from sqlalchemy.orm import joinedload
 
 from app import __version__
 from app.auth import Identity, Role
@@ -29,12 +28,14 @@ from app.labeling.scene_things import things_of_scene
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.labeling.view import DragHandlers, SceneView
 from app.memory import give_back
+from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
-from app.tables import Condition, EstimateRow, Frame, Registration, Scene, Task
+from app.tables import Condition, EstimateRow, Frame, Registration, Task
 from app.worker import JobResult, Proposals, SearchJob, SnapJob
 from registration_core import ObjectModel, pose
 from registration_core.pose_error import mssd
@@ -134,8 +135,13 @@ class Desk:
         return seat.session.snapshot().snap if seat else None
 
     def uncertainty(self, seat: Seat, snap_id: str | None) -> Uncertainty | None:
-        """What is not known about a pose that stems from a snap; None where it stems from none."""
-        estimate = None if snap_id is None else self._log.estimate(snap_id)
+        """What is not known about a pose that stems from a snap; None where it stems from none.
+
+        None as well where the task is done without knowing that.
+        """
+        if snap_id is None or "uncertainty" not in seat.session.tools:
+            return None
+        estimate = self._log.estimate(snap_id)
         if estimate is None:
             return None
         T_world_camera = np.array(seat.frames[estimate.frame_id].T_world_camera)
@@ -164,6 +170,15 @@ class Desk:
                 seat.watchers -= 1
 
         return leave
+
+    def leave(self, user_id: int) -> None:
+        """Close the sessions of a user who may not go on."""
+        with self._lock:
+            theirs = [seat for seat in self._seats.values() if seat.registration.user_id == user_id]
+            for seat in theirs:
+                del self._seats[seat.registration.id]
+        for seat in theirs:
+            _close(seat)
 
     def close_idle(self, idle_seconds: float = IDLE_SECONDS) -> int:
         """Close sessions that nobody watches and nobody used lately; returns how many."""
@@ -237,6 +252,7 @@ class Desk:
             known_objects=lambda: neighbours.known,
             request_search=request_search,
             now=self._log.clock.monotonic,
+            in_study=is_trial(registration),
         )
 
         def depth_view(frame_id: int) -> DepthView:
@@ -353,21 +369,6 @@ class Desk:
         coloring.update(state)
         seat.session.subscribe(coloring.update)
         return view
-
-
-def whole_registration(database: Database, registration_id: int) -> Registration | None:
-    """A registration with its task, object, scene and frames."""
-    with database.read() as session:
-        return session.scalar(
-            select(Registration)
-            .where(Registration.id == registration_id)
-            .options(
-                joinedload(Registration.task).joinedload(Task.object),
-                joinedload(Registration.task).joinedload(Task.scene).selectinload(Scene.frames),
-                joinedload(Registration.task).joinedload(Task.frame),
-                joinedload(Registration.user),
-            )
-        )
 
 
 class _Shown:

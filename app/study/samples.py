@@ -13,7 +13,7 @@ from app import __version__
 from app.analysis.trace import trace_of, until_submission
 from app.database import Database
 from app.event_log import EventLog
-from app.labeling.desk import whole_registration
+from app.registration_rows import whole_registration
 from app.tables import Event, Frame, Object, Participant, Registration, Task, Trial
 from registration_core import SnapConfig
 

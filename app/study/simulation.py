@@ -6,7 +6,6 @@ the server that is named so (`SimulatedClock.boot_id`).
 
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import chain, islice, zip_longest
 from typing import cast
 
@@ -18,11 +17,9 @@ from app.auth import Actor, Identity, Role
 from app.database import Database
 from app.event_log import EventLog
 from app.labeling.desk import Desk
-from app.scene_data import SceneData
-from app.snapping import Snapper
 from app.study.plan import StudyPlan, TaskRef
 from app.study.simulated_operator import CARES, HANDS, SimulatedClock, SimulatedOperator
-from app.study.studies import Studies
+from app.study.workplace import Workplace
 from app.tables import Event, Mode, Participant, Registration, Study, Task, Trial
 
 BY_HAND = "manual"
@@ -30,20 +27,6 @@ BY_HAND = "manual"
 
 class SimulationError(Exception):
     """A study cannot be simulated; the message says why and may be shown."""
-
-
-@dataclass(frozen=True)
-class Workplace:
-    """What simulated operators work with."""
-
-    database: Database
-    data: SceneData
-    snapper: Snapper
-
-    @property
-    def studies(self) -> Studies:
-        """The studies of the database."""
-        return Studies(self.database, self.data)
 
 
 def known_tasks(database: Database, scenes: int) -> list[TaskRef]:

@@ -7,7 +7,8 @@ from sqlalchemy import select
 from app.analysis.trace import trace_of, until_submission
 from app.auth import Actor, Identity, Role
 from app.event_log import EventLog
-from app.labeling.desk import Desk, whole_registration
+from app.labeling.desk import Desk
+from app.registration_rows import whole_registration
 from app.scene_data import camera_of
 from app.services import Services
 from app.snapping import SnapError
