@@ -15,6 +15,7 @@ from app.config import PROJECT
 from benchmarks import (
     ablation,
     commits,
+    curves,
     known,
     live,
     load,
@@ -39,6 +40,7 @@ BENCHMARKS = {
     "registration": registration,
     "ablation": ablation,
     "known": known,
+    "curves": curves,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""

@@ -34,6 +34,8 @@ class Gain:
     @property
     def verdict(self) -> str:
         """What the interval of the gain allows to say."""
+        if self.gain.operators == 0:
+            return "no snap was computed from there"
         if self.gain.operators < 2:
             return "cannot be told: less than two operators"
         if self.gain.low > 0:

@@ -52,7 +52,7 @@ def page_of(report: Report) -> str:
 def _simulated(report: Report) -> str:
     if not report.collected.is_simulated:
         return ""
-    return '<p class="simulated">Simulated: operators of this study are scripts, not people.</p>'
+    return '<p class="simulated">Simulated: in this study scripts stand in for people.</p>'
 
 
 def _counts(report: Report) -> str:
