@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel
 
 from app.analysis.collect import TruthSource
-from app.analysis.gains import rotation_answers
 from app.analysis.report import Report, ReportConfig, report_of
 from app.analysis.selection import Selection, choices_of
 from app.analysis.trial import ErrorKind
@@ -67,7 +66,6 @@ class ReportOut(BaseModel):
     trials: int
     cells: list[CellOut]
     gains: list[GainOut]
-    rotation: list[str] = Field(description="whether a snap improves rotation, in sentences")
     comparisons: list[ComparisonOut]
     truths: list[TruthOut]
     remarks: list[RemarkOut]
@@ -140,7 +138,6 @@ def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
         trials=len(collected.trials),
         cells=[cell_out(cell) for cell in report.cells if error in (None, cell.error)],
         gains=[gain_out(gain) for gain in report.gains if error in (None, gain.error)],
-        rotation=rotation_answers(report.gains),
         comparisons=[comparison_out(pair) for pair in report.comparisons],
         truths=[
             TruthOut(

@@ -81,7 +81,7 @@ def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
     page.locator("select[name=error]").select_option("rotation")
     page.locator("select[name=mode]").select_option("quick")
     expect(page.locator(".chart")).to_have_count(1)
-    expect(page.locator(".chart h2")).to_have_text("expert, rotation")
+    expect(page.locator(".chart h2")).to_have_text("expert, rotation · simulated")
     assert "group=expert" in page.url and "error=rotation" in page.url
 
     picture = page.locator(".chart svg")

@@ -40,7 +40,7 @@ def test_a_report_tells_curves_and_all_that_is_read_off_them(url, reviewer):
     assert last["registration_id"] is not None
     assert cell["stg"]["points"][-1]["seconds"] is None and cell["stg"]["points"][-1]["share"] == 0.0
     assert cell["hand_off"]["saved"] == pytest.approx(5.9)
-    assert any("a snap worsens it" in answer for answer in report["rotation"])
+    assert any("a snap worsens it; rotation error" in gain["sentence"] for gain in report["gains"])
     assert "group expert" in [remark["about"] for remark in report["remarks"]]
 
 
