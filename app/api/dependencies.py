@@ -138,6 +138,8 @@ Id = Annotated[int, Path(ge=1, le=2**31 - 1)]
 """Of a row, in a path."""
 QueryId = Annotated[int | None, Query(ge=1, le=2**31 - 1)]
 """Of a row, as a filter of a list."""
+Choice = Annotated[str | None, Query(max_length=500)]
+"""A name that something has to have; all where it is left out."""
 
 
 def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> Seat:

@@ -7,10 +7,11 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Response
 from pydantic import BaseModel
 
 from app.analysis.collect import TruthSource
+from app.analysis.curves import SNAP_SECONDS
 from app.analysis.report import Report, ReportConfig, report_of
 from app.analysis.selection import Selection, choices_of
 from app.analysis.trial import ErrorKind
-from app.api.dependencies import Id, ReviewerDep, ServicesDep
+from app.api.dependencies import Choice, Id, ReviewerDep, ServicesDep
 from app.api.problems import InputError
 from app.api.report_models import (
     CellOut,
@@ -72,16 +73,15 @@ class ReportOut(BaseModel):
 
 
 def asked_config(
-    snap_seconds: Annotated[float, Query(ge=0, le=60, description="charged for each offline snap")] = 0.1,
+    snap_seconds: Annotated[
+        float, Query(ge=0, le=60, description="charged for each offline snap")
+    ] = SNAP_SECONDS,
     without_idle: Annotated[bool, Query(description="leave idle time out")] = False,
     truth: Annotated[TruthSource, Query(description="what errors are measured from")] = "operators",
     seed: Annotated[int, Query(ge=0, le=2**31 - 1, description="of the bootstrap")] = 0,
 ) -> ReportConfig:
     """How the report is to be computed."""
     return ReportConfig(snap_seconds, without_idle, truth, seed)
-
-
-Choice = Annotated[str | None, Query(max_length=500)]
 
 
 def asked_selection(
