@@ -15,6 +15,7 @@ from app.api import (
     exports,
     health,
     objects,
+    participation,
     placement,
     problems,
     registration_stream,
@@ -26,6 +27,7 @@ from app.api import (
     searches,
     sign_in,
     snaps,
+    studies,
     tasks,
     team_reports,
     three_points,
@@ -44,6 +46,7 @@ from app.scene_data import SceneData
 from app.services import Services
 from app.snapping import Snapper, create_snapper
 from app.storage import FileStore
+from app.study.studies import Studies
 
 SECONDS_BETWEEN_CLEANINGS = 60.0
 
@@ -72,6 +75,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
         kept=Kept(database),
+        studies=Studies(database, data),
     )
 
 
@@ -120,6 +124,8 @@ def create_app(services: Services) -> FastAPI:
         exports,
         team_reports,
         reports,
+        studies,
+        participation,
     ):
         app.include_router(module.router)
     app.include_router(replay_proxy.router)

@@ -8,6 +8,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.middleware.base import RequestResponseEndpoint
 
 from app.api.dependencies import identify
+from app.auth import Role
 from app.config import PROJECT
 
 STATIC = PROJECT / "static"
@@ -26,6 +27,12 @@ def install(app: FastAPI) -> None:
     app.middleware("http")(_add_headers)
 
 
+@router.get("/participate")
+def participate_page() -> FileResponse:
+    """A participant's door into a study: their link leads here."""
+    return FileResponse(STATIC / "participate.html")
+
+
 @router.get("/sign-in")
 def sign_in_page() -> FileResponse:
     """Signing in, by password or one-time link."""
@@ -34,15 +41,19 @@ def sign_in_page() -> FileResponse:
 
 @router.get("/")
 @router.get("/export")
+@router.get("/studies")
 @router.get("/label/{task_id}")
 @router.get("/replay/{registration_id}")
 @router.get("/report/{study_id}")
 def page(request: Request) -> Response:
     """Every other page: for those who are signed in."""
-    if identify(request) is None:
+    identity = identify(request)
+    if identity is None:
         wanted = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
         return RedirectResponse(f"/sign-in?next={quote(wanted, safe='')}", 303)
     name = request.url.path.split("/")[1] or "home"
+    if identity.role is Role.PARTICIPANT and name != "label":
+        return RedirectResponse("/participate", 303)
     return FileResponse(STATIC / f"{name}.html")
 
 

@@ -13,6 +13,7 @@ from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.snapping import Snapper
 from app.storage import FileStore
+from app.study.studies import Studies
 
 
 @dataclass(frozen=True)
@@ -30,3 +31,4 @@ class Services:
     replays: Replays
     export_jobs: ExportJobs
     kept: Kept
+    studies: Studies

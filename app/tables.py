@@ -357,3 +357,7 @@ class OfflineSnap(Base):
     evaluations: Mapped[int]
     version: Mapped[str] = mapped_column(String(40))
     hardware: Mapped[str] = mapped_column(String(200))
+
+
+OUTSIDE_STUDIES = Registration.user_id.not_in(select(Participant.user_id))
+"""Registrations of the ordinary work, which what participants of studies do never mixes with."""

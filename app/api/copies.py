@@ -3,11 +3,12 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
+from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Identity
 from app.labeling.copying import Copy, copies_for
 from app.labeling.desk import NotFoundError, Seat
+from app.labeling.tools import require
 from app.services import Services
 from app.tables import Pose
 
@@ -42,16 +43,14 @@ class CopyChoice(BaseModel):
 
 
 @router.get("/{registration_id}/copies")
-def list_copies(seat: SeatDep, services: ServicesDep, identity: IdentityDep) -> Copies:
+def list_copies(seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> Copies:
     """Poses that can be copied: of other operators, then of the neighbouring frames, nearest first."""
     found = _copies(seat, services, identity)
     return Copies(items=[_copy_out(copy, identity) for copy in found.values()])
 
 
 @router.post("/{registration_id}/copy")
-def copy_pose(
-    body: CopyChoice, seat: SeatDep, services: ServicesDep, identity: IdentityDep
-) -> RegistrationOut:
+def copy_pose(body: CopyChoice, seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
     """Put the object where another registration has it."""
     copy = _copies(seat, services, identity).get(body.registration_id)
     if copy is None:
@@ -62,6 +61,7 @@ def copy_pose(
 
 
 def _copies(seat: Seat, services: Services, identity: Identity) -> dict[int, Copy]:
+    require(seat.session.tools, "copy")
     found = copies_for(seat.registration, identity, services.database, services.log)
     return {copy.source.id: copy for copy in found}
 

@@ -27,7 +27,7 @@ from app.api.problems import InputError
 from app.auth import Identity
 from app.importing import import_archive
 from app.services import Services
-from app.tables import Dataset, Object, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, Dataset, Object, Registration, Scene, Task
 
 router = APIRouter(prefix="/api/datasets", tags=["datasets"])
 
@@ -116,12 +116,14 @@ def _take_in(file: UploadFile, services: Services, identity: Identity) -> Datase
 
 
 def _out(session: Session, row: Dataset) -> DatasetOut:
-    tasks = select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id)
+    tasks = (
+        select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id, ~Task.is_for_studies)
+    )
     submitted = (
         select(func.count(distinct(Registration.task_id)))
         .join(Registration.task)
         .join(Task.scene)
-        .where(Scene.dataset_id == row.id, Registration.state == "submitted")
+        .where(Scene.dataset_id == row.id, Registration.state == "submitted", OUTSIDE_STUDIES)
     )
     return DatasetOut(
         id=row.id,

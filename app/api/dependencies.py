@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import Depends, HTTPException, Path, Query
 from numpy.typing import NDArray
 from pydantic import BaseModel
-from sqlalchemy import Select
+from sqlalchemy import ColumnElement, Select
 from sqlalchemy.orm import Session
 from sqlalchemy.orm.interfaces import ORMOption
 from starlette.requests import HTTPConnection
@@ -17,6 +17,7 @@ from app.api.problems import InputError
 from app.auth import Identity, Role
 from app.labeling.desk import Seat
 from app.services import Services
+from app.study.participation import sees
 from app.tables import Pose
 from registration_core import pose
 
@@ -80,7 +81,9 @@ def at_least(role: Role) -> Callable[[Identity], Identity]:
 
 
 ServicesDep = Annotated[Services, Depends(get_services)]
-IdentityDep = Annotated[Identity, Depends(signed_in)]
+AnyoneDep = Annotated[Identity, Depends(signed_in)]
+"""Participants of studies as well: the route looks after what is theirs."""
+IdentityDep = Annotated[Identity, Depends(at_least(Role.OPERATOR))]
 ReviewerDep = Annotated[Identity, Depends(at_least(Role.REVIEWER))]
 AdminDep = Annotated[Identity, Depends(at_least(Role.ADMIN))]
 LimitDep = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="Most items to return.")]
@@ -142,9 +145,15 @@ Choice = Annotated[str | None, Query(max_length=500)]
 """A name that something has to have; all where it is left out."""
 
 
-def my_seat(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> Seat:
+def my_seat(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> Seat:
     """The caller's own live session."""
     return services.desk.seat(registration_id, identity)
 
 
 SeatDep = Annotated[Seat, Depends(my_seat)]
+
+
+def check_sees(services: Services, identity: Identity, what: ColumnElement[bool], name: str) -> None:
+    """404 for a participant none of whose tasks meets a condition on `Task`; others may see everything."""
+    if identity.role is Role.PARTICIPANT and not sees(services.database, identity.user_id, what):
+        raise HTTPException(404, f"There is no {name} of yours.")

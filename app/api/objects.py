@@ -9,19 +9,22 @@ from sqlalchemy import select
 
 from app.api.dependencies import (
     AfterDep,
+    AnyoneDep,
     Id,
     IdentityDep,
     LimitDep,
     Page,
     QueryId,
     ServicesDep,
+    check_sees,
     page_of,
     row_or_404,
 )
 from app.api.scenes import FOREVER
+from app.auth import Identity
 from app.outline_mesh import packed
 from app.services import Services
-from app.tables import Object
+from app.tables import Object, Task
 from registration_core.object_model import read_mesh
 
 router = APIRouter(prefix="/api/objects", tags=["objects"])
@@ -57,15 +60,15 @@ def list_objects(
 
 
 @router.get("/{object_id}")
-def get_object(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> ObjectOut:
+def get_object(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> ObjectOut:
     """One object."""
-    return _out(_object(services, object_id))
+    return _out(_object(services, object_id, identity))
 
 
 @router.get("/{object_id}/mesh.ply", response_class=Response)
-def get_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+def get_mesh(object_id: Id, services: ServicesDep, identity: IdentityDep) -> Response:
     """The object's mesh, millimetres, as it was imported."""
-    row = _object(services, object_id)
+    row = _object(services, object_id, identity)
     path = services.files.path(row.mesh_hash)
     if row.mesh_format == "ply":
         return FileResponse(path, media_type="application/octet-stream")
@@ -74,13 +77,14 @@ def get_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Re
 
 
 @router.get("/{object_id}/outline.mesh", response_class=Response)
-def get_outline_mesh(object_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+def get_outline_mesh(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> Response:
     """The mesh thinned for drawing outlines: uint32 V and F, float32 (V, 3) in metres, uint32 (F, 3)."""
-    content = packed(services.data.thinned_model(_object(services, object_id)))
+    content = packed(services.data.thinned_model(_object(services, object_id, identity)))
     return Response(content, media_type="application/octet-stream", headers=FOREVER)
 
 
-def _object(services: Services, object_id: int) -> Object:
+def _object(services: Services, object_id: int, identity: Identity) -> Object:
+    check_sees(services, identity, Task.object_id == object_id, f"object {object_id}")
     with services.database.read() as session:
         return row_or_404(session, Object, object_id)
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
+from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, frame_of, points_of, target_of, viewpoint_of
 from app.api.registration_state import RegistrationOut, registration_out
 from app.labeling import placement, viewpoint
@@ -59,7 +59,7 @@ class GizmoChoice(BaseModel):
 
 
 @router.post("/{registration_id}/nudge")
-def nudge(body: Nudge, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+def nudge(body: Nudge, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Move the object a little, or turn it about its middle."""
     translation, rotation = np.array(body.translation), np.array(body.rotation)
 
@@ -72,7 +72,7 @@ def nudge(body: Nudge, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
 
 
 @router.post("/{registration_id}/rest")
-def rest(seat: SeatDep, services: ServicesDep, identity: IdentityDep) -> RegistrationOut:
+def rest(seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
     """Put the object down on the surface near it, without turning it."""
 
     def change(T_world_object: Array) -> Array:
@@ -88,7 +88,7 @@ def rest(seat: SeatDep, services: ServicesDep, identity: IdentityDep) -> Registr
 
 @router.post("/{registration_id}/place")
 def place(
-    body: PixelPoint | ViewPoint, seat: SeatDep, services: ServicesDep, identity: IdentityDep
+    body: PixelPoint | ViewPoint, seat: SeatDep, services: ServicesDep, identity: AnyoneDep
 ) -> RegistrationOut:
     """Put the object where somebody pointed, without turning it.
 

@@ -15,6 +15,7 @@ from starlette.exceptions import HTTPException
 from app.auth import SignInError, TooManyAttemptsError
 from app.labeling.desk import NotFoundError
 from app.labeling.track import ActionError
+from app.study.studies import StudyError
 
 logger = logging.getLogger(__name__)
 
@@ -69,6 +70,7 @@ def install(app: FastAPI) -> None:
         (NotFoundError, HTTPStatus.NOT_FOUND),
         (ActionError, HTTPStatus.CONFLICT),
         (InputError, HTTPStatus.UNPROCESSABLE_ENTITY),
+        (StudyError, HTTPStatus.CONFLICT),
         (TooManyAttemptsError, HTTPStatus.TOO_MANY_REQUESTS),
         (SignInError, HTTPStatus.UNAUTHORIZED),
     ):

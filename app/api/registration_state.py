@@ -7,6 +7,7 @@ from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.desk import Seat
 from app.labeling.layers import Layers
 from app.labeling.session import SessionState
+from app.labeling.tools import Tool
 from app.tables import Pose
 from registration_core import pose
 from registration_core.depth_agreement import Verdict
@@ -67,6 +68,8 @@ class RegistrationOut(BaseModel):
     revision: int = Field(description="Grows with every change: of two states the larger is the newer.")
     task_id: int
     condition: str
+    tools: list[Tool]
+    """What may be used beside the gizmo, undo and the views."""
     state: str
     skip_reason: str | None
     frame_id: int
@@ -81,7 +84,7 @@ class RegistrationOut(BaseModel):
     layers: Layers
     """What the 3-D view shows."""
     agreement: AgreementOut | None
-    """Nothing where no part of the object is in the frame."""
+    """Nothing where no part of the object is in the frame, or the task is done without it."""
     saved: bool
     """Whether all of it is on the disk: a drag is when it ends."""
     snap: SnapOut | None
@@ -106,6 +109,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         revision=state.revision,
         task_id=seat.registration.task_id,
         condition=seat.registration.task.condition,
+        tools=sorted(seat.session.tools),
         state=state.state,
         skip_reason=state.skip_reason,
         frame_id=state.frame_id,
@@ -142,6 +146,8 @@ def _snap_out(state: SessionState) -> SnapOut | None:
 
 
 def _agreement_out(seat: Seat, state: SessionState) -> AgreementOut | None:
+    if "agreement" not in seat.session.tools:
+        return None
     agreement = seat.reading.of(state.frame_id, state.T_world_object)
     if not len(agreement.verdicts):
         return None

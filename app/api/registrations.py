@@ -11,6 +11,7 @@ from sqlalchemy import select
 from app.api.dependencies import (
     EXAMPLE_POSE,
     AfterDep,
+    AnyoneDep,
     Id,
     IdentityDep,
     LimitDep,
@@ -88,7 +89,7 @@ def get_registration(seat: SeatDep) -> RegistrationOut:
 
 
 @router.put("/{registration_id}/pose")
-def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+def set_pose(body: NewPose, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Put the object at a pose."""
     T_world_object = rigid_pose(body.T_world_object, "T_world_object")
     detail = {} if body.stems_from is None else {"stems_from": body.stems_from}
@@ -97,14 +98,14 @@ def set_pose(body: NewPose, seat: SeatDep, identity: IdentityDep) -> Registratio
 
 
 @router.put("/{registration_id}/frame")
-def show_frame(body: FrameChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+def show_frame(body: FrameChoice, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Show, and snap against, another frame of the scene."""
     seat.session.show_frame(body.frame_id, identity.actor)
     return registration_out(seat)
 
 
 @router.put("/{registration_id}/live")
-def set_live(body: LiveChoice, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+def set_live(body: LiveChoice, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Turn live snapping on or off."""
     seat.session.set_live(body.on, identity.actor)
     return registration_out(seat)
@@ -118,7 +119,7 @@ def show_layers(body: Layers, seat: SeatDep) -> RegistrationOut:
 
 
 def _add_action(name: str, act: Callable[[LabelingSession, Actor], None], summary: str) -> None:
-    def route(seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+    def route(seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
         act(seat.session, identity.actor)
         return registration_out(seat)
 
@@ -137,7 +138,7 @@ _add_action("reopen", LabelingSession.reopen, "Go on with what was submitted or 
 
 
 @router.post("/{registration_id}/skip")
-def skip(body: Skip, seat: SeatDep, identity: IdentityDep) -> RegistrationOut:
+def skip(body: Skip, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Finish without a pose."""
     seat.session.skip(identity.actor, body.reason)
     return registration_out(seat)

@@ -13,17 +13,20 @@ from sqlalchemy.orm import selectinload
 
 from app.api.dependencies import (
     AfterDep,
+    AnyoneDep,
     Id,
     IdentityDep,
     LimitDep,
     Page,
     QueryId,
     ServicesDep,
+    check_sees,
     page_of,
     row_or_404,
 )
+from app.auth import Identity
 from app.services import Services
-from app.tables import Frame, Pose, Scene
+from app.tables import Frame, Pose, Scene, Task
 
 router = APIRouter(prefix="/api", tags=["scenes"])
 
@@ -83,16 +86,17 @@ def list_scenes(
 
 
 @router.get("/scenes/{scene_id}")
-def get_scene(scene_id: Id, services: ServicesDep, _identity: IdentityDep) -> SceneOut:
+def get_scene(scene_id: Id, services: ServicesDep, identity: AnyoneDep) -> SceneOut:
     """One scene with its frames."""
+    check_sees(services, identity, Task.scene_id == scene_id, f"scene {scene_id}")
     with services.database.read() as session:
         return _scene_out(row_or_404(session, Scene, scene_id))
 
 
 @router.get("/frames/{frame_id}/color.png", response_class=Response)
-def get_color(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+def get_color(frame_id: Id, services: ServicesDep, identity: AnyoneDep) -> Response:
     """A frame's colour image; 404 where it has none."""
-    frame = _frame(services, frame_id)
+    frame = _frame(services, frame_id, identity)
     if frame.color_hash is None:
         raise HTTPException(404, f"Frame {frame_id} has no colour image.")
     path = services.files.path(frame.color_hash)
@@ -105,23 +109,25 @@ def get_color(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Re
 
 
 @router.get("/frames/{frame_id}/depth.png", response_class=FileResponse)
-def get_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> FileResponse:
+def get_depth(frame_id: Id, services: ServicesDep, identity: IdentityDep) -> FileResponse:
     """A frame's depth image, 16 bit; `depth_scale` turns its values into millimetres."""
-    frame = _frame(services, frame_id)
+    frame = _frame(services, frame_id, identity)
     return FileResponse(services.files.path(frame.depth_hash), media_type="image/png", headers=FOREVER)
 
 
 @router.get("/frames/{frame_id}/depth.raw", response_class=Response)
-def get_raw_depth(frame_id: Id, services: ServicesDep, _identity: IdentityDep) -> Response:
+def get_raw_depth(frame_id: Id, services: ServicesDep, identity: IdentityDep) -> Response:
     """The values of `depth.png` as uint16, little endian, row by row: browsers read but 8 bits of a PNG."""
-    with Image.open(services.files.path(_frame(services, frame_id).depth_hash)) as image:
+    with Image.open(services.files.path(_frame(services, frame_id, identity).depth_hash)) as image:
         content = np.asarray(image).astype("<u2").tobytes()
     return Response(content, media_type="application/octet-stream", headers=FOREVER)
 
 
-def _frame(services: Services, frame_id: int) -> Frame:
+def _frame(services: Services, frame_id: int, identity: Identity) -> Frame:
     with services.database.read() as session:
-        return row_or_404(session, Frame, frame_id)
+        frame = row_or_404(session, Frame, frame_id)
+    check_sees(services, identity, Task.scene_id == frame.scene_id, f"frame {frame_id}")
+    return frame
 
 
 def _scene_out(row: Scene) -> SceneOut:

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Cookie, HTTPException, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import func, select
 
-from app.api.dependencies import SESSION_COOKIE, IdentityDep, ServicesDep, is_same_origin
+from app.api.dependencies import SESSION_COOKIE, AnyoneDep, ServicesDep, is_same_origin
 from app.auth import LOGIN_LIFETIME
 from app.services import Services
 from app.tables import Registration
@@ -24,7 +24,7 @@ class Credentials(BaseModel):
 
 
 class Link(BaseModel):
-    """The secret of a one-time sign-in link."""
+    """The secret of a sign-in link."""
 
     token: str = Field(max_length=200)
 
@@ -53,6 +53,13 @@ def sign_in_with_link(body: Link, request: Request, services: ServicesDep) -> Re
     return _with_cookie(request, services, services.auth.sign_in_with_link(body.token), LOGIN_LIFETIME)
 
 
+@router.post("/sign-in/study", status_code=204)
+def sign_in_to_study(body: Link, request: Request, services: ServicesDep) -> Response:
+    """Sign in with a participant's link, which can be used again: sets the login cookie."""
+    _refuse_foreign_page(request)
+    return _with_cookie(request, services, services.auth.sign_in_to_study(body.token), LOGIN_LIFETIME)
+
+
 @router.post("/sign-out", status_code=204)
 def sign_out(
     request: Request,
@@ -67,7 +74,7 @@ def sign_out(
 
 
 @router.get("/me")
-def me(identity: IdentityDep, services: ServicesDep) -> Me:
+def me(identity: AnyoneDep, services: ServicesDep) -> Me:
     """Who is signed in."""
     mine = select(func.count(Registration.id)).filter_by(user_id=identity.user_id, state="submitted")
     with services.database.read() as session:

@@ -1,5 +1,6 @@
 """Tasks: what is to be registered, and taking one up."""
 
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -11,20 +12,24 @@ from sqlalchemy.orm import Session, joinedload, selectinload, undefer
 from app.api.dependencies import (
     AdminDep,
     AfterDep,
+    AnyoneDep,
     Id,
     IdentityDep,
     LimitDep,
     Page,
     QueryId,
     ServicesDep,
+    check_sees,
     page_of,
 )
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
+from app.auth import Identity, Role
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose
-from app.tables import Condition, Frame, Mode, Object, Registration, Scene, Task
+from app.study.participation import require_turn
+from app.tables import OUTSIDE_STUDIES, Condition, Frame, Mode, Object, Registration, Scene, Task
 from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
@@ -103,7 +108,7 @@ def list_tasks(
     limit: LimitDep = 100,
 ) -> Page:
     """All tasks, or those of a dataset, a scene, or in a state."""
-    query = _tasks()
+    query = _tasks().where(~Task.is_for_studies)
     if dataset_id is not None:
         query = query.join(Task.scene).where(Scene.dataset_id == dataset_id)
     if scene_id is not None:
@@ -111,7 +116,7 @@ def list_tasks(
     if state is not None:
         query = query.where(_is_in_state(state))
     with services.database.read() as session:
-        return page_of(session, query, Task.id, after, limit, lambda row: _out(row, identity.user_id))
+        return page_of(session, query, Task.id, after, limit, _out_for(identity))
 
 
 @router.get("/next")
@@ -120,17 +125,22 @@ def next_task(services: ServicesDep, identity: IdentityDep) -> TaskOut:
     mine = Task.registrations.any((Registration.user_id == identity.user_id) & (Registration.state == "open"))
     with services.database.read() as session:
         for condition in (mine, _is_in_state("open")):
-            row = session.scalars(_tasks().where(condition).order_by(Task.id).limit(1)).unique().first()
+            row = (
+                session.scalars(_tasks().where(~Task.is_for_studies, condition).order_by(Task.id).limit(1))
+                .unique()
+                .first()
+            )
             if row is not None:
-                return _out(row, identity.user_id)
+                return _out_for(identity)(row)
     raise HTTPException(404, "All tasks are done or in other hands.")
 
 
 @router.get("/{task_id}")
-def get_task(task_id: Id, services: ServicesDep, identity: IdentityDep) -> TaskOut:
+def get_task(task_id: Id, services: ServicesDep, identity: AnyoneDep) -> TaskOut:
     """One task."""
+    check_sees(services, identity, Task.id == task_id, f"task {task_id}")
     with services.database.read() as session:
-        return _out(_task(session, task_id), identity.user_id)
+        return _out_for(identity)(_task(session, task_id))
 
 
 @router.post("", status_code=201)
@@ -148,21 +158,21 @@ def create_task(body: NewTask, services: ServicesDep, identity: AdminDep) -> Tas
         frame = scene.frames[0]
     start = _start(services, item, frame)
     with services.database.write() as session:
-        same = select(Task.instance).filter_by(
-            scene_id=scene.id, object_id=item.id, mode=body.mode, condition=body.condition
-        )
-        task = Task(
-            scene_id=scene.id,
-            object_id=item.id,
-            instance=max(session.scalars(same), default=-1) + 1,
-            mode=body.mode,
-            condition=body.condition,
-            frame_id=frame.id,
-            T_world_object_start=start.tolist(),
-        )
-        session.add(task)
+        key = {
+            "scene_id": scene.id,
+            "object_id": item.id,
+            "mode": body.mode,
+            "condition": body.condition,
+        }
+        same = select(Task.instance).filter_by(**key, is_for_studies=False)
+        key["instance"] = max(session.scalars(same), default=-1) + 1
+        task = session.scalar(select(Task).filter_by(**key))
+        if task is None:
+            task = Task(**key, frame_id=frame.id, T_world_object_start=start.tolist())
+            session.add(task)
+        task.is_for_studies = False
         session.flush()
-        return _out(_task(session, task.id), identity.user_id)
+        return _out_for(identity)(_task(session, task.id))
 
 
 @router.get("/{task_id}/thumbnail.jpg", response_class=Response)
@@ -175,8 +185,14 @@ def get_thumbnail(task_id: Id, services: ServicesDep, _identity: IdentityDep) ->
 
 
 @router.post("/{task_id}/registration")
-def start_registration(task_id: Id, services: ServicesDep, identity: IdentityDep) -> RegistrationOut:
-    """Begin my registration of this task, or go on with it where I left it."""
+def start_registration(task_id: Id, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
+    """Begin my registration of this task, or go on with it where I left it.
+
+    A participant of a study may begin only the task that comes next in it.
+    """
+    check_sees(services, identity, Task.id == task_id, f"task {task_id}")
+    if identity.role is Role.PARTICIPANT:
+        require_turn(services.database, identity.user_id, task_id)
     return registration_out(services.desk.start(task_id, identity))
 
 
@@ -205,9 +221,9 @@ def _task(session: Session, task_id: int) -> Task:
 def _is_in_state(state: TaskState) -> ColumnElement[bool]:
     """As `_state_of` tells of one task."""
     begun, submitted, in_progress = (
-        Task.registrations.any(),
-        Task.registrations.any(Registration.state == "submitted"),
-        Task.registrations.any(Registration.state == "open"),
+        Task.registrations.any(OUTSIDE_STUDIES),
+        Task.registrations.any(OUTSIDE_STUDIES & (Registration.state == "submitted")),
+        Task.registrations.any(OUTSIDE_STUDIES & (Registration.state == "open")),
     )
     match state:
         case "submitted":
@@ -220,16 +236,26 @@ def _is_in_state(state: TaskState) -> ColumnElement[bool]:
             return ~begun
 
 
-def _state_of(row: Task) -> TaskState:
+def _state_of(registrations: Sequence[Registration]) -> TaskState:
     """What has come furthest counts; skipped is only what everybody who began it skipped."""
-    states = {registration.state for registration in row.registrations}
+    states = {registration.state for registration in registrations}
     if not states:
         return "open"
     return "submitted" if "submitted" in states else "in_progress" if "open" in states else "skipped"
 
 
-def _out(row: Task, user_id: int) -> TaskOut:
-    mine = next((r.id for r in row.registrations if r.user_id == user_id), None)
+def _out_for(identity: Identity) -> Callable[[Task], TaskOut]:
+    """As somebody may know of tasks: a participant of a study of their own work, others of the ordinary."""
+
+    def out(row: Task) -> TaskOut:
+        mine = [r for r in row.registrations if r.user_id == identity.user_id]
+        ordinary = [r for r in row.registrations if r.user.role != Role.PARTICIPANT]
+        return _out(row, mine if identity.role is Role.PARTICIPANT else ordinary, mine)
+
+    return out
+
+
+def _out(row: Task, registrations: Sequence[Registration], mine: Sequence[Registration]) -> TaskOut:
     return TaskOut(
         id=row.id,
         dataset=Named(id=row.scene.dataset.id, name=row.scene.dataset.name),
@@ -240,11 +266,11 @@ def _out(row: Task, user_id: int) -> TaskOut:
         frame_id=row.frame_id,
         mode=row.mode,
         condition=row.condition,
-        state=_state_of(row),
+        state=_state_of(registrations),
         operators=[
             OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason, registration_id=r.id)
-            for r in row.registrations
+            for r in registrations
         ],
-        mine=mine,
+        mine=mine[0].id if mine else None,
         thumbnail_url=f"/api/tasks/{row.id}/thumbnail.jpg",
     )

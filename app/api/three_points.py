@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import IdentityDep, SeatDep, ServicesDep
+from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, target_of, viewpoint_of
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
@@ -66,7 +66,7 @@ class ThreePointsOut(BaseModel):
 
 @router.post("/{registration_id}/three-points")
 def three_points(
-    body: PointPairs, seat: SeatDep, services: ServicesDep, identity: IdentityDep
+    body: PointPairs, seat: SeatDep, services: ServicesDep, identity: AnyoneDep
 ) -> ThreePointsOut:
     """Put the object where the pairs agree best; where the task has a machine, it snaps from there."""
     on_object = np.array([pair.on_object for pair in body.pairs])
@@ -75,7 +75,7 @@ def three_points(
     detail = _detail(on_object, in_world, fit)
     seat.session.set_pose(fit.T_camera_object, identity.actor, "three points", detail)
     snap_id = None
-    if seat.registration.task.condition != "manual":
+    if "snap" in seat.session.tools:
         snap_id = seat.session.snap(identity.actor, start_spread=fit.start_spread)
     return ThreePointsOut(
         registration=registration_out(seat),

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
-from app.tables import EstimateRow, Event, Frame, Object, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, EstimateRow, Event, Frame, Object, Registration, Scene, Task
 
 Record = dict[str, Any]
 
@@ -134,7 +134,7 @@ def events_query(dataset_id: int) -> Select[*tuple[Any, ...]]:
         .join(Task, Registration.task_id == Task.id)
         .join(Scene, Task.scene_id == Scene.id)
         .join(Object, Task.object_id == Object.id)
-        .where(Scene.dataset_id == dataset_id)
+        .where(Scene.dataset_id == dataset_id, OUTSIDE_STUDIES)
         .order_by(Event.registration_id, Event.sequence)
     )
 
@@ -148,7 +148,7 @@ def estimates_query(dataset_id: int) -> Select[*tuple[Any, ...]]:
         .join(Scene, Task.scene_id == Scene.id)
         .join(Object, Task.object_id == Object.id)
         .join(Frame, EstimateRow.frame_id == Frame.id)
-        .where(Scene.dataset_id == dataset_id)
+        .where(Scene.dataset_id == dataset_id, OUTSIDE_STUDIES)
         .order_by(EstimateRow.registration_id, EstimateRow.id)
     )
 

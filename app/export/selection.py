@@ -12,7 +12,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session, contains_eager, joinedload
 
 from app.scene_data import camera_of, symmetries_from_json
-from app.tables import Dataset, Frame, Object, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, Dataset, Frame, Object, Registration, Scene, Task
 from registration_core import Intrinsics, Symmetries
 
 Array = NDArray[np.float64]
@@ -151,7 +151,7 @@ def count_skipped(
     rows = session.scalars(
         select(Registration)
         .join(Registration.task)
-        .where(Task.scene_id.in_(annotations), Registration.state == SKIPPED)
+        .where(Task.scene_id.in_(annotations), Registration.state == SKIPPED, OUTSIDE_STUDIES)
         .options(contains_eager(Registration.task).joinedload(Task.object))
     ).all()
     annotated = {(scene, a.obj_id, a.instance) for scene, found in annotations.items() for a in found}
@@ -167,7 +167,7 @@ def select_annotations(session: Session, dataset_id: int) -> dict[int, tuple[Ann
         .join(Registration.task)
         .join(Task.scene)
         .join(Task.object)
-        .where(Scene.dataset_id == dataset_id, Registration.state == SUBMITTED)
+        .where(Scene.dataset_id == dataset_id, Registration.state == SUBMITTED, OUTSIDE_STUDIES)
         .options(contains_eager(Registration.task).joinedload(Task.object))
         .order_by(Task.scene_id, Object.obj_id, Task.instance, Registration.id)
     ).all()

@@ -16,7 +16,7 @@ from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog
 from app.labeling.history import Step, replay
-from app.tables import Frame, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, Frame, Registration, Scene, Task
 from registration_core import pose
 
 MOST_COPIES = 20
@@ -43,6 +43,7 @@ def copies_for(
 
     Others' poses can be copied once they are submitted, but not into a task without a machine, where
     everybody works alone: there, nothing comes from a task with a machine either. Reviewers may copy any.
+    Nothing comes from a study: what its participants do is theirs alone.
     """
     task = registration.task
     same_task = _registrations(identity, task).where(
@@ -67,7 +68,7 @@ def _registrations(identity: Identity, task: Task) -> Select[Registration]:
         joinedload(Registration.task).joinedload(Task.frame),
         joinedload(Registration.task).joinedload(Task.scene),
     )
-    return query.where(_may_copy(identity, task))
+    return query.where(_may_copy(identity, task), OUTSIDE_STUDIES)
 
 
 def _may_copy(identity: Identity, task: Task) -> ColumnElement[bool]:

@@ -29,6 +29,7 @@ from app.labeling.scene_things import things_of_scene
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession, SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.labeling.view import DragHandlers, SceneView
 from app.memory import give_back
@@ -134,8 +135,13 @@ class Desk:
         return seat.session.snapshot().snap if seat else None
 
     def uncertainty(self, seat: Seat, snap_id: str | None) -> Uncertainty | None:
-        """What is not known about a pose that stems from a snap; None where it stems from none."""
-        estimate = None if snap_id is None else self._log.estimate(snap_id)
+        """What is not known about a pose that stems from a snap; None where it stems from none.
+
+        None as well where the task is done without knowing that.
+        """
+        if snap_id is None or "uncertainty" not in seat.session.tools:
+            return None
+        estimate = self._log.estimate(snap_id)
         if estimate is None:
             return None
         T_world_camera = np.array(seat.frames[estimate.frame_id].T_world_camera)
@@ -164,6 +170,15 @@ class Desk:
                 seat.watchers -= 1
 
         return leave
+
+    def leave(self, user_id: int) -> None:
+        """Close the sessions of a user who may not go on."""
+        with self._lock:
+            theirs = [seat for seat in self._seats.values() if seat.registration.user_id == user_id]
+            for seat in theirs:
+                del self._seats[seat.registration.id]
+        for seat in theirs:
+            _close(seat)
 
     def close_idle(self, idle_seconds: float = IDLE_SECONDS) -> int:
         """Close sessions that nobody watches and nobody used lately; returns how many."""
@@ -237,6 +252,7 @@ class Desk:
             known_objects=lambda: neighbours.known,
             request_search=request_search,
             now=self._log.clock.monotonic,
+            in_study=is_trial(registration),
         )
 
         def depth_view(frame_id: int) -> DepthView:

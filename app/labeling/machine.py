@@ -2,7 +2,7 @@
 
 import secrets
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from app.auth import Actor
@@ -22,8 +22,8 @@ from app.labeling.snap_exchange import (
     stored_spread,
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
+from app.labeling.tools import Tool, require
 from app.labeling.track import ActionError, Array, Track
-from app.tables import Condition
 from registration_core import SnapConfig
 
 TAKE_OVER_CONFIDENCE = 0.9
@@ -43,7 +43,8 @@ class Machine:
     Args:
         registration_id: Whose estimates these are.
         track: The object's way, which results are put on.
-        condition: What the machine may do in this task.
+        tools: What may be used on this task.
+        takes_turns: Whether it looks for a better pose whenever the operator lets go.
         same_pose: Tells whether the operator has seen a result before.
         request_snap: Hands an order to the workers.
         known_objects: Tells what is known of other objects in the scene.
@@ -53,14 +54,16 @@ class Machine:
         self,
         registration_id: int,
         track: Track,
-        condition: Condition,
+        tools: Collection[Tool],
+        takes_turns: bool,
         same_pose: SamePose,
         request_snap: RequestSnap,
         known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
         self._registration_id = registration_id
         self._track = track
-        self._condition = condition
+        self._tools = tools
+        self._takes_turns = takes_turns
         self._same_pose = same_pose
         self._request_snap = request_snap
         self._known_objects = known_objects
@@ -72,16 +75,11 @@ class Machine:
         """Of the last snap."""
         self.offer: Offer | None = None
 
-    def require(self) -> None:
-        """Raise `ActionError` where there is no machine."""
-        if self._condition == "manual":
-            raise ActionError("This task is done by hand alone: there is no machine to help.")
-
     def snap(
         self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
     ) -> str:
         """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
-        self.require()
+        require(self._tools, "snap")
         self.abandon(actor, "superseded")
         order = self._order(config, seed, start_spread)
         self._track.record(
@@ -124,7 +122,7 @@ class Machine:
         """Turn live snapping on or off."""
         if on == self._live.is_on:
             return
-        self.require()
+        require(self._tools, "live snap")
         self._track.record(NewEvent(kind="live", actor=actor, detail={"on": on}))
         self._live.is_on = on
 
@@ -143,7 +141,7 @@ class Machine:
 
     def take_turn(self) -> None:
         """The operator has let go of the object: in `auto`, snap without being asked."""
-        if self._condition == "auto":
+        if self._takes_turns:
             self.snap(Actor.MACHINE, SnapConfig(), None, Unsaid.FROM_DRAGS)
 
     def abandon(self, actor: Actor, reason: str) -> None:

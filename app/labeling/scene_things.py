@@ -10,8 +10,9 @@ from sqlalchemy.orm import joinedload, selectinload, undefer
 
 from app.database import Database
 from app.labeling.snap_exchange import KnownObject
+from app.labeling.tools import is_trial
 from app.scene_data import SceneData
-from app.tables import Registration, Task
+from app.tables import OUTSIDE_STUDIES, Registration, Task
 
 COLORS = ("#2fb98a", "#f2e35e", "#cf7fbb", "#d3d7dc", "#8f7cf0", "#a5843c")
 """They differ in lightness, for those who cannot tell hues, and none is the human's or the machine's."""
@@ -38,12 +39,13 @@ class Thing:
 def things_of_scene(database: Database, data: SceneData, registration: Registration) -> tuple[Thing, ...]:
     """What is asked for in a registration's scene, in the order of the tasks.
 
+    A participant of a study knows only of the thing that is asked for, and nobody knows of what studies do.
     Of tasks for one and the same thing, in other modes or conditions, one stands for all. How far it is says
     the operator's own registration, if it is done, else the newest that anybody submitted.
     """
     own = registration.task
     groups = defaultdict(list)
-    for task in _tasks(database, own.scene_id):
+    for task in _tasks(database, registration):
         groups[task.object_id, task.instance].append(task)
     return tuple(
         _thing(tasks, own, registration.user_id, COLORS[index % len(COLORS)], data)
@@ -56,12 +58,21 @@ def name_of(task: Task) -> str:
     return f"{task.object.name} #{task.instance + 1}" if task.instances > 1 else task.object.name
 
 
-def _tasks(database: Database, scene_id: int) -> Sequence[Task]:
+def _tasks(database: Database, registration: Registration) -> Sequence[Task]:
+    own = registration.task
+    if is_trial(registration):
+        wanted, counted = Task.id == own.id, Registration.id == registration.id
+    else:
+        wanted, counted = (Task.scene_id == own.scene_id) & ~Task.is_for_studies, OUTSIDE_STUDIES
     with database.read() as session:
         return session.scalars(
             select(Task)
-            .where(Task.scene_id == scene_id)
-            .options(joinedload(Task.object), selectinload(Task.registrations), undefer(Task.instances))
+            .where(wanted)
+            .options(
+                joinedload(Task.object),
+                selectinload(Task.registrations.and_(counted)),
+                undefer(Task.instances),
+            )
             .order_by(Task.id)
         ).all()
 

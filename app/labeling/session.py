@@ -34,6 +34,7 @@ from app.labeling.snap_exchange import (
     SnapStatus,
 )
 from app.labeling.start_spread import StartSpread, Unsaid
+from app.labeling.tools import TOOL_OF, Tool, require, tools_of
 from app.labeling.track import ActionError, RecordEvent, Track
 from app.tables import Condition
 from registration_core import SnapConfig
@@ -84,7 +85,7 @@ class LabelingSession:
         frame_id: The frame that is shown and snapped against.
         frame_ids: The scene's frames.
         pivot: The gizmo's place (3,) on the object, metres, in the object's frame.
-        condition: What the machine may do.
+        condition: What it may be done with.
         same_pose: Tells whether two poses are one, as far as anybody could tell.
         record_event: Writes an event durably; raises where it cannot.
         request_snap: Hands an order to the workers.
@@ -92,6 +93,7 @@ class LabelingSession:
         skip_reason: Why it was skipped, where it was.
         known_objects: Tells what is known of other objects in the scene.
         now: Tells the seconds that the paths of drags are written down with.
+        in_study: Whether by a participant, who has only what the condition is named after.
     """
 
     def __init__(
@@ -110,7 +112,10 @@ class LabelingSession:
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
         now: Callable[[], float] = time.monotonic,
+        in_study: bool = False,
     ) -> None:
+        self.tools: frozenset[Tool] = tools_of(condition, in_study)
+        """What may be used beside the gizmo, undo and the views."""
         self.registration_id = registration_id
         self._state = state
         self._skip_reason = skip_reason
@@ -119,7 +124,13 @@ class LabelingSession:
         self._now = now
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
-            registration_id, self._track, condition, same_pose, self._request_from_workers, known_objects
+            registration_id,
+            self._track,
+            self.tools,
+            condition == "auto",
+            same_pose,
+            self._request_from_workers,
+            known_objects,
         )
         self._search = Search(
             self._track,
@@ -232,6 +243,7 @@ class LabelingSession:
         """
         with self._lock:
             self._require_free_hands()
+            require(self.tools, TOOL_OF.get(technique, "precision"))
             before = self._track.history.current.T_world_object
             event = NewEvent(
                 kind="set_pose",
@@ -260,6 +272,8 @@ class LabelingSession:
     def show_layers(self, layers: Layers) -> None:
         """Let the view show these; that moves nothing, and may be done at any time."""
         with self._lock:
+            if layers.agreement:
+                require(self.tools, "agreement")
             self._layers = layers
             self._changed()
 
@@ -316,6 +330,7 @@ class LabelingSession:
         """Finish the registration without a pose, saying why."""
         with self._lock:
             self._require_free_hands()
+            require(self.tools, "ending")
             self._machine.abandon(actor, "skipped")
             self._search.abandon(actor, "skipped")
             self._change_state("skip", actor, reason)
@@ -325,6 +340,7 @@ class LabelingSession:
         with self._lock:
             if self._is_open:
                 raise ActionError("This registration is open.")
+            require(self.tools, "ending")
             self._change_state("reopen", actor)
 
     # -- the machine's hand ------------------------------------------------------------------------
@@ -395,7 +411,7 @@ class LabelingSession:
         """
         with self._lock:
             self._require_open()
-            self._machine.require()
+            require(self.tools, "find it")
             order = SearchOrder(
                 search_id=uuid.uuid4().hex,
                 frame_id=self._track.frame_id,
@@ -420,6 +436,7 @@ class LabelingSession:
         """Show a pose as a ghost, until the object moves or another one is shown; None shows nothing."""
         with self._lock:
             self._require_free_hands()
+            require(self.tools, "snap")
             now = self._track.history.current
             self._preview = None if T_world_object is None else (now, T_world_object)
             self._changed()

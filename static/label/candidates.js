@@ -125,8 +125,8 @@ export function candidatesPart(page) {
   }
 
   const bindings = [
-    { keys: ["["], does: "Look at the candidate before; Y takes it", run: () => step(-1), repeats: true, machine: true },
-    { keys: ["]"], does: "Look at the next candidate; Y takes it", run: () => step(+1), repeats: true, machine: true },
+    { keys: ["["], does: "Look at the candidate before; Y takes it", run: () => step(-1), repeats: true, tool: "snap" },
+    { keys: ["]"], does: "Look at the next candidate; Y takes it", run: () => step(+1), repeats: true, tool: "snap" },
   ];
   return { title: "The machine", bindings, open, draw, accept, leave };
 }

@@ -51,7 +51,7 @@ export function copyPart(page) {
     button.disabled = !page.canMove();
   }
 
-  const bindings = [{ keys: ["C"], does: "Copy the pose from another frame or operator", run: show }];
+  const bindings = [{ keys: ["C"], does: "Copy the pose from another frame or operator", run: show, tool: "copy" }];
   return { title: "The object", bindings, draw };
 }
 

@@ -33,13 +33,13 @@ export function endingPart(page) {
     if (state === "open") return;
     setText(byId("ended-text"), state === "skipped" ? `Skipped: ${reason}.` : "Submitted.");
     byId("ended-icon").setAttribute("href", `/static/icons.svg#${state}`);
-    if (before?.state === state) return;
+    if (before?.state === state || page.isTrial()) return;
     dialog.close();
     page.message.clear();
     byId("replay").href = `/replay/${page.registration().id}`;
     showNext().catch(page.message.problem);
   }
 
-  const bindings = [{ keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask }];
+  const bindings = [{ keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask, tool: "ending" }];
   return { title: "The task", bindings, draw };
 }

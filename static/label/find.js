@@ -11,7 +11,7 @@ export function findPart(page) {
   byId("find-cancel").addEventListener("click", leave);
 
   const isLooking = () => ["queued", "running"].includes(page.registration()?.search?.state);
-  const canFind = () => possible(page.registration(), page.isConnected()).snap && !asking && !isLooking();
+  const canFind = () => possible(page.registration(), page.isConnected()).find && !asking && !isLooking();
 
   async function find() {
     if (!canFind()) return;
@@ -30,14 +30,13 @@ export function findPart(page) {
 
   function draw(registration, before) {
     const { search } = registration;
-    byId("find").disabled = !possible(registration, page.isConnected()).snap;
     byId("find-looking").hidden = !isLooking();
     const failed = search?.state === "failed" && before?.search?.state !== "failed";
     if (failed) page.message.show(search.message, "problem", { label: "Try again", run: find });
   }
 
   const bindings = [
-    { keys: ["F"], does: "Find: the machine shows where the object may be", run: find, machine: true },
+    { keys: ["F"], does: "Find: the machine shows where the object may be", run: find, tool: "find it" },
   ];
   return { title: "The machine", bindings, draw, leave };
 }

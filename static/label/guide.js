@@ -20,7 +20,7 @@ const STEPS = [
     name: "snap",
     text: "Bring the object roughly to its points, then press `Space`: the machine snaps it into place.",
     isDone: (now, before) => now.snap?.state === "done" && before.snap?.state !== "done",
-    machine: true,
+    tool: "snap",
   },
   { name: "image", text: "Press `Z`: the image comes closer. Where the pose is right, the outline follows the edge." },
   {
@@ -59,8 +59,9 @@ export function guidePart(page) {
   }
 
   /** Somebody who has submitted nothing yet is shown around, but once. */
-  function open(task) {
-    steps = STEPS.filter(({ machine }) => !machine || task.condition !== "manual");
+  function open() {
+    if (page.isTrial()) return; // there, everybody is told the same
+    steps = STEPS.filter(({ tool }) => !tool || page.has(tool));
     const remembered = JSON.parse(localStorage.getItem(key()));
     for (const name of remembered?.done ?? []) done.add(name);
     if (remembered ? remembered.isOn : page.me().submitted === 0) start();

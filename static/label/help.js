@@ -6,7 +6,7 @@ import { MOD } from "./keys.js";
 const SHOWN = { Mod: MOD, Escape: "Esc" };
 
 /**
- * Fills the overlay with {group, keys, does, caps?, machine?}, `caps` standing for many keys; returns the
+ * Fills the overlay with {group, keys, does, caps?, tool?}, `caps` standing for many keys; returns the
  * function that opens it.
  */
 export function setUpHelp(bindings) {
@@ -27,8 +27,8 @@ function section(name, rows) {
   return element("section", { className: "key-group" }, element("h3", {}, name), element("dl", {}, ...rows));
 }
 
-function row({ keys, does, caps, machine }) {
-  const props = { "data-keys": keys.join(" "), ...(machine ? { "data-machine": "" } : {}) };
+function row({ keys, does, caps, tool }) {
+  const props = { "data-keys": keys.join(" "), ...(tool ? { "data-tool": tool } : {}) };
   const shown = caps ? joinedCaps(caps) : keyCaps(keys);
   return element("div", props, element("dt", {}, ...shown), element("dd", {}, does));
 }

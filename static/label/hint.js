@@ -5,9 +5,9 @@ const DRAG = "Drag an arrow, square or arc until the object lies on its points";
 const IN_PLACE = "Turn the view. Does it lie on its points from every side? Then submit.";
 
 /** The hint for a registration, or an empty text. */
-export function hintFor({ state, condition, can_undo: moved, confidence, snap, offer }) {
+export function hintFor({ state, tools, can_undo: moved, confidence, snap, offer }) {
   if (state !== "open" || offer || snap?.state === "queued" || snap?.state === "running") return "";
-  if (condition === "manual") return moved ? IN_PLACE : `${DRAG}.`;
+  if (!tools.includes("snap")) return moved ? IN_PLACE : `${DRAG}.`;
   if (confidence !== null && confidence < UNSURE) {
     return "The machine is not sure. Turn the view, drag the object closer, and snap again.";
   }

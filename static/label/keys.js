@@ -4,18 +4,18 @@
 export const MOD = /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl";
 
 /**
- * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?}; `run` is handed the key and
- * whether it repeats because it is held down.
+ * Makes `attach(window)` for bindings {keys: ["Mod+Z"], run, repeats?, tool?}; `run` is handed the key and
+ * whether it repeats because it is held down. A binding works where `isHere(binding)`.
  *
  * "Mod" is Ctrl or Cmd. viser takes W A S D Q E and the arrows for its camera, so no binding may.
  */
-export function keyBindings(bindings) {
+export function keyBindings(bindings, isHere = () => true) {
   const byChord = new Map(bindings.flatMap((binding) => binding.keys.map((key) => [key, binding])));
 
   function onKeyDown(event) {
     const pressed = chord(event);
     const binding = byChord.get(pressed);
-    if (!binding || belongsToControl(event) || document.querySelector("dialog[open]")) return;
+    if (!binding || !isHere(binding) || belongsToControl(event) || document.querySelector("dialog[open]")) return;
     event.preventDefault();
     event.stopPropagation();
     if (!event.repeat || binding.repeats) binding.run(pressed, event.repeat);

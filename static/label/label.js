@@ -32,6 +32,8 @@ import { signInAgainHere } from "./sign-in-again.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
 import { threePointsPart } from "./three-points.js";
+import { showTools } from "./tools.js";
+import { trialPart } from "./trial.js";
 import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
 import { viewsPart } from "./views.js";
@@ -43,6 +45,7 @@ const pending = new Set();
 let me = null;
 let task = null;
 let registration = null;
+let tools = new Set();
 let snapRequest = null;
 let steps = Promise.resolve(); // undo and redo under way, one after the other
 let stepsLeft = 0;
@@ -52,6 +55,8 @@ const page = {
   message,
   path,
   me: () => me,
+  isTrial: () => me?.role === "participant",
+  has: (tool) => tools.has(tool),
   registration: () => registration,
   isConnected: () => connected,
   put: (action, body) => change(put(path(action), body)),
@@ -78,6 +83,7 @@ const PARTS = [
   uncertaintyPart(page),
   seeingPart(page),
   viewsPart(page),
+  trialPart(page),
   waitingPart(),
 ];
 
@@ -104,14 +110,14 @@ const BINDINGS = [
     { keys: ["?"], does: "Show these keys", run: () => openHelp() },
   ]),
   ...grouped("The machine", [
-    { keys: ["Space"], does: "Snap", run: () => act("snap"), machine: true },
-    { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, machine: true },
-    { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), machine: true },
+    { keys: ["Space"], does: "Snap", run: () => act("snap"), tool: "snap" },
+    { keys: ["Y"], does: "Accept the machine's offer, ghost or candidate", run: accept, tool: "snap" },
+    { keys: ["N"], does: "Dismiss the machine's offer", run: () => act("offer-dismiss"), tool: "snap" },
   ]),
   ...PARTS.flatMap(({ title = "More", bindings = [] }) => grouped(title, bindings)),
 ];
 const openHelp = setUpHelp(BINDINGS);
-const attachKeys = keyBindings(BINDINGS);
+const attachKeys = keyBindings(BINDINGS, ({ tool }) => !tool || tools.has(tool));
 
 attachKeys(window);
 releaseFocusAfterPointer(document);
@@ -132,6 +138,8 @@ async function openTask() {
   me = await signInAgainHere(focusView);
   const [started, described] = await Promise.all([start(), get(`/api/tasks/${taskId}`)]);
   task = described;
+  tools = new Set(started.tools);
+  showTools(tools);
   showTask();
   openView(started.view_url, attachToView);
   const [scene, object] = await Promise.all([
@@ -147,7 +155,7 @@ async function openTask() {
     onTakenOver: showTakenOver,
     onRefused: showRefused,
   });
-  await showDatasetProgress().catch(message.problem);
+  if (!page.isTrial()) await showDatasetProgress().catch(message.problem);
 }
 
 function showTask() {
@@ -189,7 +197,7 @@ function show(received) {
   reportSnap(before?.snap, registration.snap);
   const { message: problem } = registration;
   if (problem && problem !== before?.message) message.show(problem, "problem");
-  if (before && registration.state !== before.state) showDatasetProgress().catch(message.problem);
+  if (before && registration.state !== before.state && !page.isTrial()) showDatasetProgress().catch(message.problem);
 }
 
 function reportSnap(before, snap) {

@@ -1,6 +1,5 @@
 /**
  * What the machine does of its own accord: live snapping, taking over in `auto`, and what it suggests quietly.
- * In `manual` there is no machine: whatever is marked `data-machine` is put away.
  */
 
 import { byId, setText } from "../dom.js";
@@ -19,10 +18,6 @@ export function machinePart(page) {
 
   const isWanted = () => localStorage.getItem(REMEMBERED) === "on";
   const isPossible = (registration) => possible(registration, page.isConnected()).live;
-
-  function open(task) {
-    document.body.dataset.condition = task.condition;
-  }
 
   function draw(registration, before) {
     const { is_live: isLive } = registration;
@@ -47,9 +42,9 @@ export function machinePart(page) {
   }
 
   const bindings = [
-    { keys: ["V"], does: "Live on or off: a ghost shows where a snap would land", run: toggle, machine: true },
+    { keys: ["V"], does: "Live on or off: a ghost shows where a snap would land", run: toggle, tool: "live snap" },
   ];
-  return { title: "The machine", bindings, open, draw };
+  return { title: "The machine", bindings, draw };
 }
 
 /** What there is to say in the view: {kind, text, confidence}, or null. */

@@ -21,7 +21,7 @@ export function numbersPart(page) {
   function draw({ T_camera_object: T }) {
     shown = poseNumbers(T);
     for (const field of fields) {
-      field.readOnly = !page.canMove();
+      field.readOnly = !page.canMove() || !page.has("precision");
       if (field !== document.activeElement) restore(field);
     }
   }

@@ -21,17 +21,18 @@ const UNASKED = {
 /** What can be done now, by action. */
 export function possible(registration, connected) {
   const open = registration?.state === "open" && connected;
-  const machine = open && registration.condition !== "manual";
+  const has = (tool) => open && registration.tools.includes(tool);
   const shown = registration?.offer ?? registration?.live ?? null;
   return {
-    snap: machine,
-    live: machine,
+    snap: has("snap"),
+    live: has("live snap"),
+    find: has("find it"),
     cancel: open && isSnapping(registration),
     undo: open && registration.can_undo,
     redo: open && registration.can_redo,
     reset: open && registration.can_undo,
     submit: open && !isSnapping(registration) && !registration.dragging,
-    skip: open && !registration.dragging,
+    skip: has("ending") && !registration.dragging,
     reopen: connected && registration !== null && registration.state !== "open",
     "offer-accept": open && shown !== null,
     "offer-dismiss": open && registration.offer !== null,

@@ -6,9 +6,10 @@ import { scenePointing } from "./pointing.js";
 /** A part of the labelling page. */
 export function placePart(page) {
   const button = byId("place");
-  const pointing = scenePointing(page, place, (point) => page.canMove() && place(point));
+  const pointing = scenePointing(page, place, (point) => canPlace() && place(point));
   let on = false;
 
+  const canPlace = () => page.canMove() && page.has("click-to-place");
   button.addEventListener("click", () => use(!on));
   byId("place-leave").addEventListener("click", leave);
 
@@ -43,6 +44,6 @@ export function placePart(page) {
     if (!page.canMove()) leave();
   }
 
-  const bindings = [{ keys: ["P"], does: "Place the object by a click; Esc leaves this", run: () => use(!on) }];
+  const bindings = [{ keys: ["P"], does: "Place the object by a click; Esc leaves this", run: () => use(!on), tool: "click-to-place" }];
   return { title: "The object", bindings, attach: pointing.attach, leave, draw };
 }

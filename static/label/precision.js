@@ -116,12 +116,13 @@ export function precisionPart(page) {
   const letterOf = (chord) => chord.at(-1);
 
   const bindings = [
-    { keys: LETTERS, does: "Move the object a step", run: (key) => move(letterOf(key)), repeats: true },
+    { keys: LETTERS, does: "Move the object a step", run: (key) => move(letterOf(key)), repeats: true, tool: "precision" },
     {
       keys: lettersWith("Shift+"),
       caps: ["Shift", ...LETTERS],
       does: "Turn it a step",
       run: (key) => turn(letterOf(key), STEPS[step], "nudge"),
+      tool: "precision",
       repeats: true,
     },
     {
@@ -129,17 +130,19 @@ export function precisionPart(page) {
       caps: ["Alt", ...LETTERS],
       does: "Turn it by 90°",
       run: (key) => turn(letterOf(key), 90, "turn"),
+      tool: "precision",
     },
     {
       keys: lettersWith("Alt+Shift+"),
       caps: ["Alt", "Shift", ...LETTERS],
       does: "Flip it",
       run: (key) => turn(letterOf(key), 180, "flip"),
+      tool: "precision",
     },
-    { keys: ["1", "2", "3"], does: "Steps: 0.5, 2, 10 mm and degrees", run: (key) => useStep(key - 1) },
-    { keys: ["X"], does: "Step along the view, the object, the world", run: () => useAxes(nextAxes()) },
+    { keys: ["1", "2", "3"], does: "Steps: 0.5, 2, 10 mm and degrees", run: (key) => useStep(key - 1), tool: "precision" },
+    { keys: ["X"], does: "Step along the view, the object, the world", run: () => useAxes(nextAxes()), tool: "precision" },
     { keys: ["G"], does: "Gizmo along the object, the world", run: () => useGizmo(otherGizmo()) },
-    { keys: ["Shift+P"], does: "Put the object down on the surface", run: rest },
+    { keys: ["Shift+P"], does: "Put the object down on the surface", run: rest, tool: "precision" },
   ];
   return { title: "The object", bindings, draw };
 }

@@ -9,6 +9,10 @@ const AT_FIRST = { cloud: true, mesh: true, agreement: false };
 export function seeingPart(page) {
   const buttons = [...document.querySelectorAll("[data-layer]")];
   let isChanging = false;
+  const wanted = () => {
+    const remembered = { ...AT_FIRST, ...JSON.parse(localStorage.getItem(REMEMBERED)) };
+    return { ...remembered, agreement: remembered.agreement && page.has("agreement") };
+  };
   for (const button of buttons) button.addEventListener("click", () => toggle(button.dataset.layer));
 
   function draw({ agreement, layers }, before) {
@@ -35,14 +39,13 @@ export function seeingPart(page) {
   }
 
   const bindings = [
-    { keys: ["R"], does: "Colour the object by how depth agrees, or not", run: () => toggle("agreement") },
+    { keys: ["R"], does: "Colour the object by how depth agrees, or not", run: () => toggle("agreement"), tool: "agreement" },
     { keys: ["B"], does: "Hide the cloud, and show it again", run: () => toggle("cloud") },
     { keys: ["M"], does: "Hide the mesh, and show it again", run: () => toggle("mesh") },
   ];
   return { title: "The view", bindings, draw };
 }
 
-const wanted = () => ({ ...AT_FIRST, ...JSON.parse(localStorage.getItem(REMEMBERED)) });
 const isSame = (one, other) => Object.keys(AT_FIRST).every((name) => one[name] === other[name]);
 const percent = (share) => `${Math.round(100 * share)} %`;
 

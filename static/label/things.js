@@ -54,7 +54,7 @@ export function thingsPart(page) {
     box.classList.toggle("hiding", isHidden());
   }
 
-  const bindings = [{ keys: ["Shift+B"], does: "Hide or show what is done in this scene", run: toggle }];
+  const bindings = [{ keys: ["Shift+B"], does: "Hide or show what is done in this scene", run: toggle, tool: "neighbours" }];
   return { title: "The view", bindings, draw };
 }
 

@@ -201,8 +201,8 @@ export function threePointsPart(page) {
   }
 
   const bindings = [
-    { keys: ["T"], does: "Place the object by three points; Esc leaves this", run: () => use(!on) },
-    { keys: ["Backspace"], does: "Three points: take the last click back", run: takeBack },
+    { keys: ["T"], does: "Place the object by three points; Esc leaves this", run: () => use(!on), tool: "three points" },
+    { keys: ["Backspace"], does: "Three points: take the last click back", run: takeBack, tool: "three points" },
   ];
   return { title: "The object", bindings, open, attach: pointing.attach, leave, draw };
 }

@@ -54,7 +54,7 @@ export function uncertaintyPart(page) {
   }
 
   const bindings = [
-    { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, machine: true },
+    { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, tool: "uncertainty" },
   ];
   return { title: "The machine", bindings, attach, draw };
 }

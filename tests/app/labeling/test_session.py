@@ -127,7 +127,7 @@ def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
 class Bench:
     """A session between a log and workers."""
 
-    def __init__(self, state: str = "open", condition: Condition = "snap") -> None:
+    def __init__(self, state: str = "open", condition: Condition = "snap", in_study: bool = False) -> None:
         self.log = Log()
         self.workers = Workers()
         self.searchers = Searchers()
@@ -143,6 +143,7 @@ class Bench:
             record_event=self.log,
             request_snap=self.workers,
             request_search=self.searchers,
+            in_study=in_study,
         )
 
     @property

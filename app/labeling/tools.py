@@ -1,0 +1,75 @@
+"""What an operator may use on a task beside the gizmo, undo and the views: its condition says so."""
+
+from collections.abc import Collection
+from typing import Literal, get_args
+
+from app.auth import Role
+from app.labeling.track import ActionError
+from app.tables import Condition, Registration
+
+Tool = Literal[
+    "snap",
+    "live snap",
+    "find it",
+    "three points",
+    "click-to-place",
+    "precision",
+    "copy",
+    "neighbours",
+    "agreement",
+    "uncertainty",
+    "ending",
+]
+"""`precision`: steps, turns, numbers, putting down. `neighbours`: what is done of the scene, seen and known
+to snaps. `ending`: skipping a task, and reopening what was ended."""
+
+ALL: frozenset[Tool] = frozenset(get_args(Tool))
+MACHINES: frozenset[Tool] = frozenset({"snap", "live snap", "find it", "uncertainty"})
+ORDINARY: frozenset[Tool] = frozenset({"copy", "neighbours", "agreement", "ending"})
+"""Have nothing to do with how an object is placed."""
+COMPARED: dict[Condition, frozenset[Tool]] = {
+    "manual": frozenset(),
+    "snap": frozenset({"snap"}),
+    "auto": frozenset({"snap"}),
+    "three points": frozenset({"snap", "three points"}),
+    "click-to-place": frozenset({"snap", "click-to-place"}),
+    "live snap": frozenset({"snap", "live snap"}),
+    "find it": frozenset({"snap", "find it"}),
+}
+"""In a study, where conditions are compared, each has what it is named after and no more."""
+
+TOOL_OF: dict[str | None, Tool] = {
+    "place": "click-to-place",
+    "three points": "three points",
+    "proposal": "find it",
+    "mode": "snap",
+    "copy": "copy",
+}
+"""By the technique that the log names; any other one is `precision`."""
+
+
+def is_trial(registration: Registration) -> bool:
+    """Whether a participant of a study does it; its user has to be loaded."""
+    return registration.user.role == Role.PARTICIPANT
+
+
+def tools_of(condition: Condition, in_study: bool) -> frozenset[Tool]:
+    """What may be used on a task, by its condition and by whether a study's participant does it."""
+    if in_study:
+        return COMPARED[condition]
+    match condition:
+        case "manual":
+            return ALL - MACHINES
+        case "snap" | "auto":
+            return ALL
+        case technique:
+            return COMPARED[technique] | ORDINARY
+
+
+def require(tools: Collection[Tool], tool: Tool) -> None:
+    """Raise `ActionError` where a tool may not be used."""
+    if tool in tools:
+        return
+    if tool in MACHINES and not MACHINES & set(tools):
+        raise ActionError("This task is done by hand alone: there is no machine to help.")
+    raise ActionError(f"This task is done without the tool {tool!r}: its condition does not have it.")

@@ -1,0 +1,49 @@
+/** A task of a study: how far its participant is, a clock where the mode asks for one, and the way on. */
+
+import { get } from "../api.js";
+import { byId, setText } from "../dom.js";
+
+const SECOND_MS = 1000;
+
+/** A part of the labelling page. */
+export function trialPart(page) {
+  let clockKey = null;
+
+  async function open(task) {
+    if (!page.isTrial()) return;
+    for (const node of document.querySelectorAll("[data-ordinary]")) node.hidden = true;
+    byId("trial").hidden = false;
+    byId("trial").dataset.mode = task.mode;
+    setText(byId("trial-mode"), task.mode === "quick" ? "As quickly as you can" : "As accurately as you can");
+    if (task.mode === "quick") startClock(`snap6d.clock.${page.me().id}.${task.id}`);
+    const { done, total, task: next } = await get("/api/participation");
+    setText(byId("trial-place"), next?.is_practice ? "Practice" : `Task ${Math.min(done + 1, total)} of ${total}`);
+  }
+
+  /** Counts the time on this page; who comes back later goes on with what they had used. */
+  function startClock(key) {
+    clockKey = key;
+    byId("clock").hidden = false;
+    showClock();
+    setInterval(() => {
+      if (page.registration()?.state !== "open") return;
+      localStorage.setItem(clockKey, used() + 1);
+      showClock();
+    }, SECOND_MS);
+  }
+
+  const used = () => Number(localStorage.getItem(clockKey) ?? 0);
+
+  function showClock() {
+    const seconds = used();
+    setText(byId("clock-text"), `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`);
+  }
+
+  function draw({ state }, before) {
+    if (!page.isTrial() || state === "open" || before?.state === state) return;
+    if (clockKey) localStorage.removeItem(clockKey);
+    location.assign("/participate?go-on");
+  }
+
+  return { open, draw };
+}

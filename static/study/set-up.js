@@ -1,0 +1,169 @@
+/** Setting a study up: a form, and beside it the order that it leads to. */
+
+import { getAll, post } from "../api.js";
+import { byId, element, picture, setText } from "../dom.js";
+import { taskName } from "../format.js";
+import { messageArea } from "../message.js";
+import { showOrders } from "./orders.js";
+
+const MODES = ["accurate", "quick"];
+const CONDITIONS = ["manual", "snap", "auto", "three points", "click-to-place", "live snap", "find it"];
+const FIRST = { modes: MODES, conditions: ["manual"] };
+const INSTRUCTIONS = {
+  accurate: "Place the object as accurately as you can. Take the time you need; submit when you cannot improve it.",
+  quick: "Place the object as quickly as you can. Submit as soon as it looks about right; a clock is running.",
+};
+const PAUSE_MS = 250; // after the last key, before the order is asked for
+
+export async function showSetUp(pageMessage) {
+  const message = messageArea(byId("preview-message"));
+  let things = []; // {ref, name, scene, url, use} of the dataset that is shown, `use`: "", "task", "practice"
+  let waiting = null;
+  let newest = 0;
+
+  byId("modes").replaceChildren(...MODES.map((name) => tick("modes", name)));
+  byId("conditions").replaceChildren(...CONDITIONS.map((name) => tick("conditions", name)));
+  for (const mode of MODES) byId(`instructions-${mode}`).value = INSTRUCTIONS[mode];
+  byId("seed").value = crypto.getRandomValues(new Uint32Array(1))[0] % 100000;
+  const datasets = await getAll("/api/datasets");
+  byId("dataset").replaceChildren(...datasets.map(({ id, name }) => new Option(name, id)));
+  byId("dataset").addEventListener("change", () => showThings().catch(pageMessage.problem));
+  byId("set-up").addEventListener("input", later);
+  byId("set-up").addEventListener("submit", create);
+  byId("set-up").hidden = false;
+  if (datasets.length) await showThings();
+
+  async function showThings() {
+    const tasks = await getAll("/api/tasks", { dataset_id: byId("dataset").value });
+    const seen = new Map(); // of tasks for one thing, in several modes and conditions, one stands for all
+    for (const task of tasks) {
+      const thing = thingOf(task);
+      if (!seen.has(keyOf(thing.ref))) seen.set(keyOf(thing.ref), thing);
+    }
+    things = [...seen.values()];
+    byId("things").replaceChildren(...things.map(thingRow));
+    later();
+  }
+
+  function thingRow(thing) {
+    const choice = element(
+      "select",
+      { "aria-label": `${thing.name}, ${thing.scene}` },
+      new Option("not used", ""),
+      new Option("counts", "task"),
+      new Option("for practice", "practice"),
+    );
+    choice.addEventListener("change", () => (thing.use = choice.value));
+    const text = element("span", {}, thing.name, element("small", {}, thing.scene));
+    return element("div", { className: "thing" }, picture(thing.url, "thing-picture", { lazy: true }), text, choice);
+  }
+
+  function plan() {
+    const used = (use) => things.filter((thing) => thing.use === use).map(({ ref }) => ref);
+    return {
+      modes: ticked("modes"),
+      conditions: ticked("conditions"),
+      groups: groupsOf(byId("groups").value),
+      tasks: used("task"),
+      practice: used("practice"),
+      consent: byId("consent").value,
+      instructions: Object.fromEntries(MODES.map((mode) => [mode, byId(`instructions-${mode}`).value])),
+      questions: questionsOf(byId("questions").value),
+      break_after: Number(byId("break-after").value),
+    };
+  }
+
+  function later() {
+    clearTimeout(waiting);
+    byId("create").disabled = true;
+    waiting = setTimeout(() => preview().catch(message.problem), PAUSE_MS);
+  }
+
+  /** Of several answers the newest question's counts. */
+  async function preview() {
+    const mine = ++newest;
+    message.clear();
+    byId("preview-orders").replaceChildren();
+    const wanted = plan();
+    setText(byId("preview-summary"), missing(wanted) ?? "");
+    if (missing(wanted)) return;
+    const answer = await post("/api/studies/preview", { plan: wanted, seed: Number(byId("seed").value) });
+    if (mine !== newest) return;
+    setText(byId("preview-summary"), summary(wanted, answer));
+    byId("preview-orders").replaceChildren(showOrders(answer.orders, nameOf));
+    byId("create").disabled = false;
+  }
+
+  function nameOf(ref) {
+    const { name, scene } = things.find((thing) => keyOf(thing.ref) === keyOf(ref));
+    return `${name}, ${scene}`;
+  }
+
+  async function create(event) {
+    event.preventDefault();
+    byId("create").disabled = true;
+    try {
+      const body = { name: byId("name").value, plan: plan(), seed: Number(byId("seed").value) };
+      const { id } = await post("/api/studies", body);
+      location.assign(`/studies?study=${id}`);
+    } catch (error) {
+      message.problem(error);
+      byId("create").disabled = false;
+    }
+  }
+}
+
+function thingOf(task) {
+  const ref = { scene_id: task.scene.id, object_id: task.object.id, instance: task.instance };
+  return { ref, name: taskName(task), scene: task.scene.label, url: task.thumbnail_url, use: "" };
+}
+
+const keyOf = ({ scene_id: scene, object_id: object, instance }) => `${scene} ${object} ${instance}`;
+
+function tick(group, name) {
+  const box = element("input", { type: "checkbox", name: group, value: name, checked: FIRST[group].includes(name) });
+  return element("label", {}, box, name);
+}
+
+function ticked(group) {
+  return [...document.querySelectorAll(`[name="${group}"]:checked`)].map(({ value }) => value);
+}
+
+/** "novice 8, expert 8" as {novice: 8, expert: 8}. */
+function groupsOf(text) {
+  const parts = text.split(",").map((part) => part.trim()).filter(Boolean);
+  return Object.fromEntries(
+    parts.map((part) => {
+      const [, name, size] = part.match(/^(.*?)\s*(\d+)$/) ?? [null, part, "0"];
+      return [name, Number(size)];
+    }),
+  );
+}
+
+/** "Handedness: left, right" as {text: "Handedness", choices: ["left", "right"]}, a line each. */
+function questionsOf(text) {
+  const lines = text.split("\n").map((line) => line.trim()).filter(Boolean);
+  return lines.map((line) => {
+    const [question, choices = ""] = line.split(/:(.*)/s);
+    return { text: question.trim(), choices: choices.split(",").map((choice) => choice.trim()).filter(Boolean) };
+  });
+}
+
+function missing({ modes, conditions, groups, tasks }) {
+  if (!tasks.length) return "Choose at least one thing that counts: then the order is shown here.";
+  if (!modes.length || !conditions.length) return "Tick at least one mode and one condition.";
+  if (Object.values(groups).some((size) => size < 1) || !Object.keys(groups).length) {
+    return "Write each group with its number of operators, such as “novice 8, expert 8”.";
+  }
+  return null;
+}
+
+function summary({ groups, practice, conditions, tasks, modes }, { rows_of_balance: rows }) {
+  const each = tasks.length * modes.length * conditions.length;
+  const trying = practice.length * conditions.length;
+  const uneven = Object.entries(groups).filter(([, size]) => size % rows).map(([name]) => name);
+  const balance = uneven.length
+    ? ` For an even balance groups need a multiple of ${rows} operators; that is not so for ${uneven.join(", ")}.`
+    : " The order is balanced evenly.";
+  return `Each operator practises ${trying} and does ${each} tasks.${balance}`;
+}
