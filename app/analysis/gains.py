@@ -34,28 +34,29 @@ class Gain:
     @property
     def verdict(self) -> str:
         """What the interval of the gain allows to say."""
+        if self.gain.operators == 0:
+            return "no snap was computed from there"
         if self.gain.operators < 2:
             return "cannot be told: less than two operators"
         if self.gain.low > 0:
             return "a snap improves it"
         return "a snap worsens it" if self.gain.high < 0 else "no difference can be shown"
 
+    @property
+    def sentence(self) -> str:
+        """The verdict with its numbers."""
+        before, after = told(self.before.mean, self.error), told(self.after.mean, self.error)
+        return (
+            f"{self.group}, {self.mode}, {self.condition}, {self.moment}: {self.verdict}; {self.error} error"
+            f" {before} before and {after} after, gain {interval_told(self.gain, self.error)} over"
+            f" {counted(self.gain.operators, 'operator')}."
+        )
+
 
 def gains(trials: Sequence[TrialTrace], seed: int) -> list[Gain]:
     """Of trials of one group, mode and condition: for both errors, at the end and all along."""
     with_stg = [trial for trial in trials if trial.has_stg]
     return [_gain(with_stg, kind, moment, seed) for kind in ERROR_KINDS for moment in MOMENTS if with_stg]
-
-
-def rotation_answers(gains: Sequence[Gain]) -> list[str]:
-    """Whether a snap improves rotation, group by group, in sentences."""
-    return [
-        f"{gain.group}, {gain.mode}, {gain.condition}, {gain.moment}: {gain.verdict}; rotation error"
-        f" {told(gain.before.mean, 'rotation')} before and {told(gain.after.mean, 'rotation')} after,"
-        f" gain {interval_told(gain.gain, 'rotation')} over {counted(gain.gain.operators, 'operator')}."
-        for gain in gains
-        if gain.error == "rotation"
-    ]
 
 
 def _gain(trials: Sequence[TrialTrace], kind: ErrorKind, moment: str, seed: int) -> Gain:

@@ -5,11 +5,10 @@ from html import escape
 
 from app.analysis.bootstrap import RESAMPLES, Interval
 from app.analysis.figure import figure_bytes
-from app.analysis.gains import rotation_answers
 from app.analysis.pose_errors import PoseErrors
 from app.analysis.remarks import counted
 from app.analysis.report import Report
-from app.analysis.units import interval_told, told
+from app.analysis.units import interval_told, number_told, share_told, told
 
 STYLE = """
 :root { color-scheme: light dark; --line: #d9dad6; --soft: #f4f4f1; }
@@ -33,7 +32,7 @@ def page_of(report: Report) -> str:
         _simulated(report),
         f"<p>{_counts(report)}</p>",
         f"<figure>{svg[svg.index('<svg') :]}</figure>",
-        _section("Does a snap improve rotation as well?", rotation_answers(report.gains), _gains(report)),
+        _section("Does a snap improve rotation as well?", _answers(report), _gains(report)),
         _section("Hand-off", [], _hand_offs(report)),
         _section("Fitts' law: time = a + b log2(D/W + 1)", [], _fitts(report)),
         _section("Conditions in pairs", [], _comparisons(report)),
@@ -52,7 +51,7 @@ def page_of(report: Report) -> str:
 def _simulated(report: Report) -> str:
     if not report.collected.is_simulated:
         return ""
-    return '<p class="simulated">Simulated: operators of this study are scripts, not people.</p>'
+    return '<p class="simulated">Simulated: in this study scripts stand in for people.</p>'
 
 
 def _counts(report: Report) -> str:
@@ -60,6 +59,10 @@ def _counts(report: Report) -> str:
         f"{escape(name)}: {counted(count, 'operator')}" for name, count in report.collected.groups.items()
     )
     return f"{counted(len(report.collected.trials), 'trial')} count. {groups}."
+
+
+def _answers(report: Report) -> list[str]:
+    return [gain.sentence for gain in report.gains if gain.error == "rotation"]
 
 
 def _gains(report: Report) -> str:
@@ -87,7 +90,7 @@ def _gains(report: Report) -> str:
                 interval_told(gain.before, gain.error),
                 interval_told(gain.after, gain.error),
                 interval_told(gain.gain, gain.error),
-                f"{100 * gain.improved:.0f} %",
+                share_told(gain.improved),
                 gain.gain.operators,
                 gain.verdict,
             )
@@ -144,8 +147,8 @@ def _fitts(report: Report) -> str:
                 line.margins,
                 interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
                 interval_told(Interval(line.b, *line.b_interval, cell.operators), None) + " a bit",
-                f"{line.r_squared:.3f}",
-                f"{line.throughput:.3g}",
+                number_told(line.r_squared),
+                number_told(line.throughput),
             )
             for cell in report.cells
             for hand, drawn in (("human", cell.human), ("STG", cell.stg))

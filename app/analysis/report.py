@@ -1,6 +1,6 @@
 """The report of a study: from the database to curves and all that is read off them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -86,9 +86,16 @@ def write_report(report: Report, folder: Path) -> list[Path]:
     return paths
 
 
-def _order(collected: Collected):  # type: ignore[no-untyped-def] # a key function
+def _order(collected: Collected) -> Callable[[TrialTrace], tuple[int, str, bool, str, int]]:
+    """Groups as the study has them, then modes, then conditions with the baseline first."""
     groups = list(collected.groups)
-    return lambda trial: (groups.index(trial.group), trial.mode, trial.condition != "manual", trial.condition)
+    return lambda trial: (
+        groups.index(trial.group),
+        trial.mode,
+        trial.condition != "manual",
+        trial.condition,
+        trial.registration_id,
+    )
 
 
 def _never_within(trials: Sequence[TrialTrace]) -> list[Remark]:

@@ -94,6 +94,7 @@ class GainOut(BaseModel):
     improved: float | None
     trials: int
     verdict: str
+    sentence: str
 
 
 class ComparisonOut(BaseModel):
@@ -135,7 +136,7 @@ def cell_out(cell: Cell) -> CellOut:
 def gain_out(gain: Gain) -> GainOut:
     """A gain as JSON."""
     intervals = {name: interval_out(getattr(gain, name)) for name in ("before", "after", "gain")}
-    more = {"improved": number(gain.improved), "verdict": gain.verdict}
+    more = {"improved": number(gain.improved), "verdict": gain.verdict, "sentence": gain.sentence}
     return GainOut(**{**vars(gain), **intervals, **more})
 
 

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
-from pydantic import BaseModel, Field
+from pydantic import BaseModel
 
 from app.analysis.collect import TruthSource
-from app.analysis.gains import rotation_answers
+from app.analysis.curves import SNAP_SECONDS
 from app.analysis.report import Report, ReportConfig, report_of
 from app.analysis.selection import Selection, choices_of
 from app.analysis.trial import ErrorKind
-from app.api.dependencies import Id, ReviewerDep, ServicesDep
+from app.api.dependencies import Choice, Id, ReviewerDep, ServicesDep
 from app.api.problems import InputError
 from app.api.report_models import (
     CellOut,
@@ -67,23 +67,21 @@ class ReportOut(BaseModel):
     trials: int
     cells: list[CellOut]
     gains: list[GainOut]
-    rotation: list[str] = Field(description="whether a snap improves rotation, in sentences")
     comparisons: list[ComparisonOut]
     truths: list[TruthOut]
     remarks: list[RemarkOut]
 
 
 def asked_config(
-    snap_seconds: Annotated[float, Query(ge=0, le=60, description="charged for each offline snap")] = 0.1,
+    snap_seconds: Annotated[
+        float, Query(ge=0, le=60, description="charged for each offline snap")
+    ] = SNAP_SECONDS,
     without_idle: Annotated[bool, Query(description="leave idle time out")] = False,
     truth: Annotated[TruthSource, Query(description="what errors are measured from")] = "operators",
     seed: Annotated[int, Query(ge=0, le=2**31 - 1, description="of the bootstrap")] = 0,
 ) -> ReportConfig:
     """How the report is to be computed."""
     return ReportConfig(snap_seconds, without_idle, truth, seed)
-
-
-Choice = Annotated[str | None, Query(max_length=500)]
 
 
 def asked_selection(
@@ -140,7 +138,6 @@ def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
         trials=len(collected.trials),
         cells=[cell_out(cell) for cell in report.cells if error in (None, cell.error)],
         gains=[gain_out(gain) for gain in report.gains if error in (None, gain.error)],
-        rotation=rotation_answers(report.gains),
         comparisons=[comparison_out(pair) for pair in report.comparisons],
         truths=[
             TruthOut(

@@ -1,15 +1,13 @@
 """The same curves from ordinary work: by operator, object and week."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from pydantic import BaseModel
 
 from app.analysis.advice import advice_for
 from app.analysis.cells import cells_of
 from app.analysis.team import TEAM_TIMING, TeamRow, Work, team_rows
 from app.analysis.trial import TrialTrace
-from app.api.dependencies import ReviewerDep, ServicesDep
+from app.api.dependencies import Choice, ReviewerDep, ServicesDep
 from app.api.problems import InputError
 from app.api.report_models import CellOut, RemarkOut, cell_out, number, remarks_out
 
@@ -51,9 +49,6 @@ class TeamOut(BaseModel):
     advice: list[AdviceOut]
     cells: list[CellOut]
     remarks: list[RemarkOut]
-
-
-Choice = Annotated[str | None, Query(max_length=500)]
 
 
 @router.get("/team")

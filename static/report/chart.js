@@ -3,11 +3,10 @@
  * opens the replay behind it.
  */
 
-import { element } from "../dom.js";
+import { element, svg } from "../dom.js";
 import { count } from "../format.js";
 import { digits, secondsText, shareText, unitOf } from "./numbers.js";
 import { BOX, HEIGHT, scalesOf, WIDTH } from "./scales.js";
-import { svg } from "./svg.js";
 
 const HINT = "Point at a curve, or move along it with the arrow keys; click or Enter opens a replay.";
 let made = 0;

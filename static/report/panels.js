@@ -6,12 +6,12 @@ import { digits, inPeopleUnits, secondsText, shareText, unitOf } from "./numbers
 import { replayLink, section, tableOf } from "./tables.js";
 
 /** Draws a chart for each group and error of the cells; `names` are what the two lines of a cell are called. */
-export function drawPanels(cells, names, { errors }) {
+export function drawPanels(cells, names, { errors, isSimulated }) {
   const shown = cells.filter(({ error }) => errors.includes(error));
   const keys = [...new Map(shown.map((cell) => [`${cell.group}, ${cell.error}`, cell])).entries()];
   const panels = keys.map(([title, { group, error }]) => {
     const series = shown.filter((cell) => cell.group === group && cell.error === error).flatMap((cell) => seriesOf(cell, names));
-    return chart(title, error, series);
+    return chart(isSimulated ? `${title} · simulated` : title, error, series);
   });
   byId("panels").replaceChildren(...(panels.length ? panels : [element("p", { className: "panel" }, "There are no trials to show.")]));
   const legend = new Map(shown.flatMap((cell) => seriesOf(cell, names)).map((one) => [one.name, one]));

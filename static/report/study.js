@@ -15,13 +15,13 @@ export async function showStudy(studyId, message) {
   const url = `/api/reports/${studyId}`;
   let newest = 0;
 
-  async function show({ error, ...asked }) {
+  async function show({ error, condition, ...asked }) {
     const turn = (newest += 1);
     byId("panels").setAttribute("aria-busy", "true");
     try {
       const report = await get(url, asked);
       if (turn !== newest) return; // another choice was made meanwhile
-      draw(report, url, asked, { errors: errorsOf({ error }) });
+      draw(of(report, condition), url, { ...asked, condition }, errorsOf({ error }));
       message.clear();
     } catch (problem) {
       message.problem(problem);
@@ -38,7 +38,7 @@ export async function showStudy(studyId, message) {
     [
       field("group", "Group"),
       field("mode", "Mode"),
-      field("condition", "Condition", { all: choices.condition.length === 0 }),
+      field("condition", "Condition", { all: choices.condition.length === 0, chosen: "manual" }),
       ERROR_FIELD,
       field("scene", "Scene"),
       field("object", "Object"),
@@ -49,7 +49,14 @@ export async function showStudy(studyId, message) {
   );
 }
 
-function draw(report, url, asked, which) {
+/** With the curves of one condition; what compares conditions stays. */
+function of(report, condition) {
+  const isShown = (part) => condition === "" || part.condition === condition;
+  return { ...report, cells: report.cells.filter(isShown), gains: report.gains.filter(isShown) };
+}
+
+function draw(report, url, asked, errors) {
+  const which = { errors, isSimulated: report.is_simulated };
   byId("simulated").hidden = !report.is_simulated;
   const groups = Object.entries(report.groups).map(([name, n]) => `${name}: ${count(n, "operator")}`);
   setText(byId("about"), [count(report.trials, "trial"), ...groups].join(" · "));
@@ -65,8 +72,9 @@ function draw(report, url, asked, which) {
 
 const cellOf = ({ group, mode, condition, error }) => [group, mode, condition, error];
 
-function rotation({ gains, rotation: answers }) {
+function rotation({ gains }) {
   if (gains.length === 0) return null;
+  const answers = gains.filter(({ error }) => error === "rotation");
   const rows = gains.map((gain) => {
     const told = (value) => errorText(value, gain.error);
     const intervals = ["before", "after", "gain"].map((name) => intervalText(gain[name], told));
@@ -75,7 +83,7 @@ function rotation({ gains, rotation: answers }) {
   const head = ["group", "mode", "condition", "error", "from", "before", "after", "gain", "better", "operators", "verdict"];
   return section(
     "Does a snap improve rotation as well?",
-    element("ul", {}, ...answers.map((answer) => element("li", {}, answer))),
+    element("ul", {}, ...answers.map(({ sentence }) => element("li", {}, sentence))),
     tableOf(head, rows),
   );
 }

@@ -19,7 +19,7 @@ export async function showTeam(message) {
   const field = (name, label) => ({ name, label, options: choices[name], all: true });
   await setUpChoices([field("operator", "Operator"), field("object", "Object"), field("week", "Week"), ERROR_FIELD], async ({ error, ...asked }) => {
     try {
-      draw(await get(URL_OF_TEAM, asked), { errors: errorsOf({ error }) });
+      draw(await get(URL_OF_TEAM, asked), { errors: errorsOf({ error }), isSimulated: false });
     } catch (problem) {
       message.problem(problem);
     }

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from app.database import Database
 from app.tables import (
@@ -19,9 +20,8 @@ from app.tables import (
     Task,
     Trial,
     User,
-    utc_now,
 )
-from tests.app.analysis.hand_made import Entry, at, moved, view
+from tests.app.analysis.hand_made import NOON, Entry, at, moved, view
 
 START = at(0.1, 1.0)
 """Where the object of every task begins: 0.1 m and 1 rad off the world's origin, which is about the truth."""
@@ -44,7 +44,7 @@ class HandMadeStudy:
     def participant(self, code: str, group: str = "novice", **more: Any) -> Participant:
         """Somebody new."""
         with self.database.write() as session:
-            user = User(name=f"{self.id} {code}", role="operator")
+            user = User(name=f"{self.id} {code}", role="participant")
             session.add(user)
             session.flush()
             row = Participant(study_id=self.id, user_id=user.id, code=code, group=group, row=0, **more)
@@ -77,31 +77,7 @@ class HandMadeStudy:
             skip_sequence: A sequence number that is missing in the log.
         """
         with self.database.write() as session:
-            scene = session.scalars(select(Scene).order_by(Scene.id)).first()
-            thing = session.scalars(
-                select(Object).where(Object.dataset_id == scene.dataset_id).order_by(Object.id)
-            ).first()
-            frame = session.scalars(
-                select(Frame).where(Frame.scene_id == scene.id).order_by(Frame.id)
-            ).first()
-            key = {
-                "scene_id": scene.id,
-                "object_id": thing.id,
-                "instance": instance,
-                "mode": mode,
-                "condition": condition,
-            }
-            task = session.scalars(select(Task).filter_by(**key)).first()
-            if task is None:
-                given = None if reference is None else reference.tolist()
-                task = Task(
-                    **key,
-                    frame_id=frame.id,
-                    T_world_object_start=START.tolist(),
-                    T_world_object_reference=given,
-                )
-                session.add(task)
-                session.flush()
+            task = task_of(session, instance, mode, condition, reference)
             places = select(Trial).where(Trial.participant_id == participant.id)
             session.add(
                 Trial(
@@ -113,22 +89,7 @@ class HandMadeStudy:
             )
             if state is None:
                 return None
-            registration = Registration(
-                task_id=task.id,
-                user_id=participant.user_id,
-                state=state,
-                T_world_object=entries[-1].T_after if entries else START.tolist(),
-                submitted_at=utc_now(),
-                skip_reason="no depth" if state == "skipped" else None,
-            )
-            session.add(registration)
-            session.flush()
-            session.add_all(
-                event_of(registration, sequence, entry)
-                for sequence, entry in enumerate(entries, start=1)
-                if sequence != skip_sequence
-            )
-            return registration.id
+            return write_log(session, task, participant.user_id, entries, state, skip_sequence)
 
     def snaps(self, registration_id: int, results: dict[float, np.ndarray | None]) -> None:
         """Offline snaps by seconds of the trace; None is one that failed."""
@@ -138,7 +99,7 @@ class HandMadeStudy:
                     registration_id=registration_id,
                     seconds=seconds,
                     T_world_object_start=START.tolist(),
-                    config_hash="of the test",
+                    input_hash=f"{seconds}",
                     config={},
                     seed=1,
                     T_world_object=None if T is None else T.tolist(),
@@ -149,6 +110,85 @@ class HandMadeStudy:
                 )
                 for seconds, T in results.items()
             )
+
+
+def ordinary_work(
+    database: Database, name: str, entries: Sequence[Entry], instance: int, state: str = "submitted"
+) -> int:
+    """A registration that belongs to no study, of a task that nobody else is shown; its id."""
+    with database.write() as session:
+        user = session.scalars(select(User).where(User.name == name)).first()
+        if user is None:
+            user = User(name=name, role="operator")
+            session.add(user)
+            session.flush()
+        task = task_of(session, instance, "accurate", "snap")
+        return write_log(session, task, user.id, entries, state)
+
+
+def task_of(
+    session: Session, instance: int, mode: str, condition: str, reference: np.ndarray | None = None
+) -> Task:
+    """A task on the first scene and object, made where it is not there."""
+    scene = session.scalars(select(Scene).order_by(Scene.id)).first()
+    assert scene is not None
+    thing = session.scalars(
+        select(Object).where(Object.dataset_id == scene.dataset_id).order_by(Object.id)
+    ).first()
+    frame = session.scalars(select(Frame).where(Frame.scene_id == scene.id).order_by(Frame.id)).first()
+    assert thing is not None and frame is not None
+    key = {
+        "scene_id": scene.id,
+        "object_id": thing.id,
+        "instance": instance,
+        "mode": mode,
+        "condition": condition,
+    }
+    task = session.scalars(select(Task).filter_by(**key)).first()
+    if task is None:
+        given = None if reference is None else reference.tolist()
+        task = Task(
+            **key,
+            frame_id=frame.id,
+            T_world_object_start=START.tolist(),
+            T_world_object_reference=given,
+            is_for_studies=True,
+        )
+        session.add(task)
+        session.flush()
+    return task
+
+
+def write_log(
+    session: Session,
+    task: Task,
+    user_id: int,
+    entries: Sequence[Entry],
+    state: str,
+    skip_sequence: int = 0,
+) -> int:
+    """A registration with its events, but for one that is missing; its id."""
+    registration = Registration(
+        task_id=task.id,
+        user_id=user_id,
+        state=state,
+        T_world_object=entries[-1].T_after if entries else START.tolist(),
+        submitted_at=NOON,
+        skip_reason="no depth" if state == "skipped" else None,
+    )
+    session.add(registration)
+    session.flush()
+    session.add_all(
+        event_of(registration, sequence, entry)
+        for sequence, entry in enumerate(entries, start=1)
+        if sequence != skip_sequence
+    )
+    return registration.id
+
+
+def snapped(seconds: float, name: str, T: np.ndarray, kind: str = "snap_applied") -> Entry:
+    """The result of a snap."""
+    return moved(seconds, kind, T, actor="machine", snap_id=name, detail={"confidence": 0.9})
 
 
 def event_of(registration: Registration, sequence: int, entry: Entry) -> Event:
