@@ -41,11 +41,8 @@ BENCHMARKS = {
     "registration": registration,
     "ablation": ablation,
     "known": known,
-<<<<<<< HEAD
     "study": study,
-=======
     "curves": curves,
->>>>>>> 6318c8b5459f07f6e4055a6341341173e9c0adf0
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""

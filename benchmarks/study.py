@@ -1,10 +1,13 @@
 """A study of simulated operators by command, end to end: what it takes, and how that grows with operators."""
 
+import csv
 import os
-import resource
+import sqlite3
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -31,49 +34,76 @@ class CommandError(Exception):
 
 
 @dataclass(frozen=True)
-class Cost:
-    """What a command took."""
+class Look:
+    """A command at one moment, with all processes that it started."""
 
     seconds: float
-    busy: float
-    """Share of all processors, percent."""
+    """Since it began."""
+    processor_seconds: float
+    """That those which run now have used."""
     megabytes: float
-    """Resident at the worst, of all its processes."""
+    """Resident; what processes share counts with each."""
+    snaps: int
+    """Offline snaps that are stored."""
 
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """The run, and another one with twice the operators."""
     datasets = [DEMO_SCENES, *([DATA / "ycbv"] if DATA.is_dir() else [])]
     operators, scenes = (1, 1) if quick else (OPERATORS, SCENES)
-    prepare_state(folder / "once", datasets)
-    prepare_state(folder / "twice", datasets)
-    once = _study(folder / "once", operators, scenes)
-    twice = _study(folder / "twice", 2 * operators, scenes)
-    seconds = sum(cost.seconds for cost in once.values())
-    growth = sum(cost.seconds for cost in twice.values()) / seconds
-    batch = once["snap"]
+    once, twice = (_study(folder / f"{n}", datasets, n, scenes) for n in (operators, 2 * operators))
+    total = _seconds(once)
+    snapping = once["snap"]
     return [
-        Figure(f"{2 * operators} operators, all in all", seconds, "s", Target(MOST_SECONDS)),
-        *(Figure(f"of it: study {command}", cost.seconds, "s") for command, cost in once.items()),
-        Figure("study snap keeps processors busy", batch.busy, "%", Target(LEAST_BUSY, at_least=True)),
-        Figure("study snap: memory of all its processes", batch.megabytes, "MB", Target(MOST_MEGABYTES)),
-        Figure("time with twice the operators", growth, "times", Target(MOST_GROWTH)),
+        Figure(f"{2 * operators} operators, all in all", total, "s", Target(MOST_SECONDS)),
+        *(Figure(f"of it, study {command}", looks[-1].seconds, "s") for command, looks in once.items()),
+        Figure("offline snaps, one a sampled pose", snapping[-1].snaps, "rows"),
+        Figure("busy processors while they are computed", _busy(snapping), "%", Target(LEAST_BUSY, True)),
+        Figure("memory of study snap", max(one.megabytes for one in snapping), "MB", Target(MOST_MEGABYTES)),
+        Figure("time with twice the operators", _seconds(twice) / total, "times", Target(MOST_GROWTH)),
+        *_rotation(folder / f"{operators}" / "report" / "gains.csv"),
     ]
 
 
-def _study(state: Path, operators: int, scenes: int) -> dict[str, Cost]:
+def _rotation(gains: Path) -> Iterator[Figure]:
+    """What a snap does to the rotation, as the report tells it."""
+    with gains.open(newline="") as lines:
+        for row in csv.DictReader(lines):
+            if row["error"] == "rotation":
+                who = f"{row['group']}, {row['mode']}, {row['moment']}"
+                interval = f"95 %: {row['gain_low']} to {row['gain_high']}"
+                yield Figure(
+                    f"{who}: a snap takes off the rotation error ({interval})", float(row["gain"]), "°"
+                )
+
+
+def _study(state: Path, datasets: Sequence[Path], operators: int, scenes: int) -> dict[str, Sequence[Look]]:
+    prepare_state(state, datasets)
     size = ("--operators", str(operators), "--scenes", str(scenes))
     return {
-        "simulate": _command(state, "simulate", NAME, *size),
-        "snap": _command(state, "snap", NAME),
-        "report": _command(state, "report", NAME, "--out", str(state / "report")),
+        "simulate": _watched(state, "simulate", NAME, *size),
+        "snap": _watched(state, "snap", NAME),
+        "report": _watched(state, "report", NAME, "--out", str(state / "report")),
     }
 
 
-def _command(state: Path, *arguments: str) -> Cost:
+def _seconds(commands: dict[str, Sequence[Look]]) -> float:
+    return sum(looks[-1].seconds for looks in commands.values())
+
+
+def _busy(looks: Sequence[Look]) -> float:
+    """Percent of all processors, from the first snap that was stored to the last one."""
+    last = next(i for i, one in enumerate(looks) if one.snaps == looks[-1].snaps)
+    first = next(i for i, one in enumerate(looks) if one.snaps or i == last - 1)
+    used = looks[last].processor_seconds - looks[first].processor_seconds
+    return 100.0 * used / (looks[last].seconds - looks[first].seconds) / (os.cpu_count() or 1)
+
+
+def _watched(state: Path, *arguments: str) -> list[Look]:
+    """Run a command about studies to its end."""
     output = state.with_suffix(".log")
-    before, began = _processor_seconds(), time.perf_counter()
-    with output.open("wb") as sink:
+    began = time.perf_counter()
+    with output.open("wb") as sink, closing(sqlite3.connect(state / "snap6d.sqlite")) as database:
         process = psutil.Popen(
             [sys.executable, "-m", "app.cli", "study", *arguments],
             cwd=PROJECT,
@@ -82,29 +112,31 @@ def _command(state: Path, *arguments: str) -> Cost:
             stdout=sink,
             stderr=subprocess.STDOUT,
         )
-    megabytes = 0.0
-    while process.poll() is None:
-        megabytes = max(megabytes, _megabytes(process))
-        time.sleep(SECONDS_BETWEEN_LOOKS)
-    seconds = time.perf_counter() - began
+        looks = []
+        while process.poll() is None:
+            looks.append(_look(process, database, began))
+            time.sleep(SECONDS_BETWEEN_LOOKS)
+        looks.append(_look(process, database, began))
     if process.returncode:
         raise CommandError(f"study {arguments[0]} failed:\n{output.read_text()}")
-    busy = 100.0 * (_processor_seconds() - before) / (seconds * (os.cpu_count() or 1))
-    return Cost(seconds, busy, megabytes)
+    return looks
 
 
-def _processor_seconds() -> float:
-    """That children of this process have used, once they ended, and theirs."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
-def _megabytes(process: psutil.Process) -> float:
-    """Of a process and those that it started; what they share counts with each."""
-    total = 0.0
-    for one in (process, *process.children(recursive=True)):
+def _look(process: psutil.Process, database: sqlite3.Connection, began: float) -> Look:
+    seconds, megabytes = 0.0, 0.0
+    for one in _family(process):
         try:
-            total += one.memory_info().rss / 1e6
+            used = one.cpu_times()
+            seconds += used.user + used.system
+            megabytes += one.memory_info().rss / 1e6
         except psutil.NoSuchProcess:
             continue
-    return total
+    snaps = database.execute("SELECT coalesce(max(id), 0) FROM offline_snaps").fetchone()[0]
+    return Look(time.perf_counter() - began, seconds, megabytes, snaps)
+
+
+def _family(process: psutil.Process) -> list[psutil.Process]:
+    try:
+        return [process, *process.children(recursive=True)]
+    except psutil.NoSuchProcess:
+        return []

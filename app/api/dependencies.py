@@ -81,17 +81,10 @@ def at_least(role: Role) -> Callable[[Identity], Identity]:
 
 
 ServicesDep = Annotated[Services, Depends(get_services)]
-<<<<<<< HEAD
-ReviewerDep = Annotated[Identity, Depends(at_least(Role.REVIEWER))]
-AnyoneDep = Annotated[Identity, Depends(signed_in)]
-"""Participants of studies as well: the route looks after what is theirs."""
-IdentityDep = Annotated[Identity, Depends(at_least(Role.OPERATOR))]
-=======
 AnyoneDep = Annotated[Identity, Depends(signed_in)]
 """Participants of studies as well: the route looks after what is theirs."""
 IdentityDep = Annotated[Identity, Depends(at_least(Role.OPERATOR))]
 ReviewerDep = Annotated[Identity, Depends(at_least(Role.REVIEWER))]
->>>>>>> 6318c8b5459f07f6e4055a6341341173e9c0adf0
 AdminDep = Annotated[Identity, Depends(at_least(Role.ADMIN))]
 LimitDep = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="Most items to return.")]
 AfterDep = Annotated[int, Query(ge=0, le=2**31 - 1, description="`next` of the page before.")]

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import and_, select
 
 from app import __version__
+from app.analysis.runs import runs_of
 from app.analysis.trace import trace_of, until_submission
 from app.database import Database
 from app.event_log import EventLog
 from app.registration_rows import whole_registration
-from app.tables import Event, Frame, Object, Participant, Registration, Task, Trial
+from app.tables import Event, Frame, Object, Task
 from registration_core import SnapConfig
 
 Array = NDArray[np.float64]
@@ -70,22 +70,10 @@ class SampledView:
 
 
 def registrations_of(database: Database, study_id: int) -> list[int]:
-    """The registrations of a study that count: submitted, no practice, of nobody who withdrew."""
-    mine = and_(Registration.user_id == Participant.user_id, Registration.task_id == Trial.task_id)
-    query = (
-        select(Registration.id)
-        .join(Participant, Registration.user_id == Participant.user_id)
-        .join(Trial, and_(Trial.participant_id == Participant.id, mine))
-        .where(
-            Participant.study_id == study_id,
-            Participant.withdrawn_at.is_(None),
-            Trial.is_practice.is_(False),
-            Registration.state == "submitted",
-        )
-        .order_by(Registration.id)
-    )
+    """The registrations of a study that count."""
     with database.read() as session:
-        return list(session.scalars(query))
+        runs, _ = runs_of(session, study_id)
+    return [run.registration.id for run in runs]
 
 
 def samples_of(database: Database, registration_id: int, config: SnapConfig) -> Iterator[Sample]:

@@ -17,7 +17,7 @@ from app.auth import Actor, Identity, Role
 from app.database import Database
 from app.event_log import EventLog
 from app.labeling.desk import Desk
-from app.study.plan import StudyPlan, TaskRef
+from app.study.plan import StudyPlan
 from app.study.simulated_operator import CARES, HANDS, SimulatedClock, SimulatedOperator
 from app.study.workplace import Workplace
 from app.tables import Event, Mode, Participant, Registration, Study, Task, Trial
@@ -29,9 +29,11 @@ class SimulationError(Exception):
     """A study cannot be simulated; the message says why and may be shown."""
 
 
-def known_tasks(database: Database, scenes: int) -> list[TaskRef]:
-    """An object of known pose in each of so many scenes, of all datasets in turn; not one that was chosen
-    before, where the scene has another one.
+def plan_of(database: Database, operators: int, scenes: int) -> StudyPlan:
+    """A plan for so many novices, as many experts, and an object of known pose in each of so many scenes.
+
+    The scenes are of all datasets in turn; objects that were chosen before are so again only where a scene
+    has no other one.
 
     Raises:
         SimulationError: where there are too few such scenes.
@@ -55,7 +57,8 @@ def known_tasks(database: Database, scenes: int) -> list[TaskRef]:
         raise SimulationError(
             f"{scenes} scenes with an object of known pose are needed; there are {len(chosen)}"
         )
-    return [TaskRef(scene_id=one.scene_id, object_id=one.object_id, instance=one.instance) for one in chosen]
+    tasks = [{"scene_id": t.scene_id, "object_id": t.object_id, "instance": t.instance} for t in chosen]
+    return StudyPlan.model_validate({"groups": dict.fromkeys(HANDS, operators), "tasks": tasks})
 
 
 def create_simulated(workplace: Workplace, name: str, plan: StudyPlan, seed: int, user_id: int) -> Study:

@@ -6,6 +6,7 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,7 @@ def report_by_call(state: Path, out: Path) -> Mapping[str, bytes]:
 
 def stored(state: Path) -> dict[int, float]:
     """Of all offline snaps, by id, how long they took."""
-    with sqlite3.connect(state / "snap6d.sqlite") as connection:
+    with closing(sqlite3.connect(state / "snap6d.sqlite")) as connection:
         return dict(connection.execute("SELECT id, snap_seconds FROM offline_snaps").fetchall())
 
 

@@ -12,7 +12,8 @@ from app.analysis.trace import trace_of, until_submission
 from app.auth import Role
 from app.services import Services
 from app.study.plan import StudyPlan
-from app.study.simulation import SimulationError, Workplace, create_simulated, simulate
+from app.study.simulation import SimulationError, create_simulated, simulate
+from app.study.workplace import Workplace
 from app.tables import Event, Participant, Registration, Study, Task
 from registration_core import pose
 
