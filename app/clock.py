@@ -9,6 +9,9 @@ from app.tables import utc_now
 BOOT_ID = uuid.uuid4().hex
 """Names this run of the server: monotonic seconds are comparable only within one run."""
 
+SIMULATED = "simulated-"
+"""How runs are named whose time is simulated."""
+
 
 class Clock:
     """This process's clock."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.auth import Actor
-from app.clock import Clock
+from app.clock import SIMULATED, Clock
 from app.labeling.session import LabelingSession
 from app.study.hand import EXPERT, NOVICE, PRESS, Hand, seen_offset, stroke_along
 from app.tables import Mode
@@ -60,7 +60,7 @@ class SimulatedClock(Clock):
     @property
     def boot_id(self) -> str:
         """Marks what happened as simulated."""
-        return f"simulated-{self._name}"
+        return f"{SIMULATED}{self._name}"
 
     def monotonic(self) -> float:
         """Simulated seconds."""

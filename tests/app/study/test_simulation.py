@@ -76,6 +76,7 @@ def test_all_of_it_is_done_and_marked(services, workplace):
     assert study.is_simulated
     for events in events_of(services, study):
         assert {event.boot_id.split("-")[0] for event in events} == {"simulated"}
+    assert all(services.replays.recorded(row.id)[1].is_simulated for _, row, _ in rows)
 
 
 def test_the_log_tells_simulated_seconds(services, workplace):
