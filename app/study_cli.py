@@ -105,8 +105,7 @@ def report_study(
 
     database = checked_database(read_settings())
     study = _existing(database, name)
-    truth = "reference" if reference else "operators"
-    config = ReportConfig(snap_seconds=snap_seconds, without_idle=without_idle, truth=truth)
+    config = ReportConfig(snap_seconds, without_idle, truth="reference" if reference else "operators")
     for path in write_report(study_report(database, study.id, config), out):
         console.print(str(path), markup=False)
 
