@@ -15,6 +15,8 @@ from sqlalchemy.orm import Session
 from app.database import Database
 from app.tables import Credential, User, utc_now
 
+LOCAL_ADMINISTRATOR = "admin"
+"""Whoever runs commands on the machine of the server."""
 LOGIN_LIFETIME = timedelta(days=14)
 LINK_LIFETIME = timedelta(hours=12)
 FREE_ATTEMPTS = 5

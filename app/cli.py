@@ -2,24 +2,19 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
-if TYPE_CHECKING:
-    from app.config import Settings
-    from app.database import Database
+from app.study_cli import study_cli
+from app.terminal import checked_database, console, fail, open_database, progress_bar, read_settings
 
 cli = typer.Typer(no_args_is_help=True, add_completion=False, help="Annotate 6-DoF object poses, with help.")
 token_cli = typer.Typer(no_args_is_help=True, help="API tokens for scripts and robots.")
 user_cli = typer.Typer(no_args_is_help=True, help="People who may sign in.")
 cli.add_typer(token_cli, name="token")
 cli.add_typer(user_cli, name="user")
-
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+cli.add_typer(study_cli, name="study")
 
 RoleOption = Annotated[str, typer.Option(help="operator, reviewer or admin.")]
 
@@ -31,7 +26,7 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("SNAP6D_DEBUG"):
             raise
-        _fail(str(error) or type(error).__name__)
+        fail(str(error) or type(error).__name__)
 
 
 @cli.command()
@@ -58,7 +53,7 @@ def serve(
         "scheduler_address": scheduler_address,
         "workers": workers,
     }
-    settings = _settings(**given)
+    settings = read_settings(**given)
     listener = listen(settings)
     settings.state_dir.mkdir(parents=True, exist_ok=True)
     snapper = create_snapper(settings)
@@ -73,7 +68,7 @@ def serve(
 @cli.command()
 def migrate() -> None:
     """Make the database, or bring it up to this version."""
-    database = _database(_settings())
+    database = open_database(read_settings())
     database.migrate()
     console.print("The database is up to date.")
 
@@ -87,9 +82,9 @@ def import_command(
     from app.importing import import_dataset
     from app.storage import FileStore
 
-    settings = _settings()
-    database = _checked_database(settings)
-    with _progress() as progress:
+    settings = read_settings()
+    database = checked_database(settings)
+    with progress_bar() as progress:
         task = progress.add_task("checking", total=1.0)
         summary = import_dataset(
             database,
@@ -116,14 +111,14 @@ def export_command(
     from app.storage import FileStore
     from app.tables import Dataset
 
-    settings = _settings()
-    database = _checked_database(settings)
+    settings = read_settings()
+    database = checked_database(settings)
     with database.read() as session:
         row = session.scalar(select(Dataset).where(Dataset.name == dataset))
         names = session.scalars(select(Dataset.name)).all()
     if row is None:
-        _fail(f"there is no dataset {dataset!r}; there are: {', '.join(names) or 'none'}")
-    with _progress() as progress:
+        fail(f"there is no dataset {dataset!r}; there are: {', '.join(names) or 'none'}")
+    with progress_bar() as progress:
         task = progress.add_task("exporting", total=1.0)
         summary = export_dataset(
             database,
@@ -143,7 +138,7 @@ def create_token(name: str, role: RoleOption = "operator") -> None:
     """Print an API token for NAME, once."""
     from app.auth import Auth
 
-    console.print(Auth(_checked_database(_settings())).create_token(name, _role(role)))
+    console.print(Auth(checked_database(read_settings())).create_token(name, _role(role)))
 
 
 @user_cli.command("add")
@@ -156,8 +151,8 @@ def add_user(
     from app.auth import Auth
     from app.listening import sign_in_link
 
-    settings = _settings()
-    auth = Auth(_checked_database(settings))
+    settings = read_settings()
+    auth = Auth(checked_database(settings))
     secret = typer.prompt("Password", hide_input=True, confirmation_prompt=True) if password else None
     user = auth.create_user(name, _role(role), secret)
     console.print(f"User {user.name} may sign in, once, with this link:")
@@ -170,55 +165,19 @@ def link_user(name: str) -> None:
     from app.auth import Auth
     from app.listening import sign_in_link
 
-    settings = _settings()
-    auth = Auth(_checked_database(settings))
+    settings = read_settings()
+    auth = Auth(checked_database(settings))
     link = sign_in_link(settings, settings.port, auth.create_link(auth.user(name).id))
     console.print(f"User {name} may sign in, once, with this link:")
     console.print(link)
-
-
-def _settings(**given: object) -> "Settings":
-    from pydantic import ValidationError
-
-    from app.config import Settings
-
-    try:
-        return Settings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0])
-        _fail(f"setting {name} (SNAP6D_{name.upper()}) is {first['input']!r}: {first['msg']}")
-
-
-def _database(settings: "Settings") -> "Database":
-    from app.database import Database
-
-    settings.state_dir.mkdir(parents=True, exist_ok=True)
-    return Database(settings.resolved_database_url)
-
-
-def _checked_database(settings: "Settings") -> "Database":
-    database = _database(settings)
-    database.check_version()
-    return database
 
 
 def _role(name: str):  # type: ignore[no-untyped-def] # Role is imported late
     from app.auth import Role
 
     if name not in set(Role):
-        _fail(f"role {name!r} is unknown; choose one of {', '.join(Role)}")
+        fail(f"role {name!r} is unknown; choose one of {', '.join(Role)}")
     return Role(name)
-
-
-def _progress() -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn())
-    return Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal)
-
-
-def _fail(message: str) -> NoReturn:
-    errors.print(f"snap6d: {message}", markup=False)
-    raise SystemExit(1)
 
 
 if __name__ == "__main__":

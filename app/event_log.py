@@ -1,7 +1,5 @@
 """The append-only log of what operators and the machine did: on the disk when `append` returns."""
 
-import time
-import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,11 +7,9 @@ from typing import Any
 from sqlalchemy import func, select
 
 from app.auth import Actor
+from app.clock import Clock
 from app.database import Database
-from app.tables import EstimateRow, Event, Pose, Registration, utc_now
-
-BOOT_ID = uuid.uuid4().hex
-"""Names this run of the server: monotonic seconds are comparable only within one run."""
+from app.tables import EstimateRow, Event, Pose, Registration
 
 STATE_AFTER = {"submit": "submitted", "skip": "skipped", "reopen": "open"}
 """Events that end a registration or begin it anew, and how it stands then."""
@@ -37,10 +33,11 @@ class NewEvent:
 
 
 class EventLog:
-    """Writes and reads the events of registrations."""
+    """Writes and reads the events of registrations, each with the time on `clock`."""
 
-    def __init__(self, database: Database) -> None:
+    def __init__(self, database: Database, clock: Clock | None = None) -> None:
         self._database = database
+        self.clock = clock or Clock()
 
     def append(
         self, registration_id: int, user_id: int, event: NewEvent, estimate: EstimateRow | None = None
@@ -58,9 +55,9 @@ class EventLog:
                 registration_id=registration_id,
                 user_id=user_id,
                 sequence=(last or 0) + 1,
-                utc=utc_now(),
-                monotonic_seconds=time.monotonic(),
-                boot_id=BOOT_ID,
+                utc=self.clock.utc(),
+                monotonic_seconds=self.clock.monotonic(),
+                boot_id=self.clock.boot_id,
                 kind=event.kind,
                 actor=event.actor,
                 T_before=event.T_before,

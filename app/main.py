@@ -8,6 +8,7 @@ import httpx
 from fastapi import FastAPI
 
 from app import __version__, pages
+from app.analysis.kept import Kept
 from app.api import (
     copies,
     datasets,
@@ -20,6 +21,7 @@ from app.api import (
     registration_stream,
     registrations,
     replay,
+    reports,
     scene_things,
     scenes,
     searches,
@@ -27,6 +29,7 @@ from app.api import (
     snaps,
     studies,
     tasks,
+    team_reports,
     three_points,
     uncertainty,
 )
@@ -71,6 +74,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         desk=Desk(database, log, data, snapper),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
+        kept=Kept(database),
         studies=Studies(database, data),
     )
 
@@ -118,6 +122,8 @@ def create_app(services: Services) -> FastAPI:
         searches,
         uncertainty,
         exports,
+        team_reports,
+        reports,
         studies,
         participation,
     ):

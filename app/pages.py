@@ -44,6 +44,7 @@ def sign_in_page() -> FileResponse:
 @router.get("/studies")
 @router.get("/label/{task_id}")
 @router.get("/replay/{registration_id}")
+@router.get("/report/{study_id}")
 def page(request: Request) -> Response:
     """Every other page: for those who are signed in."""
     identity = identify(request)

@@ -8,7 +8,7 @@ import rich
 import uvicorn
 from sqlalchemy import select
 
-from app.auth import Role
+from app.auth import LOCAL_ADMINISTRATOR, Role
 from app.config import PROJECT, Settings
 from app.database import Database
 from app.importing import import_dataset
@@ -21,7 +21,6 @@ from app.storage import FileStore
 from app.tables import Dataset
 
 DEMO_SCENES = PROJECT / "scenes" / "demo"
-LOCAL_ADMINISTRATOR = "admin"
 SECONDS_TO_FINISH = 3
 
 

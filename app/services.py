@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from app.analysis.kept import Kept
 from app.auth import Auth
 from app.config import Settings
 from app.database import Database
@@ -29,4 +30,5 @@ class Services:
     desk: Desk
     replays: Replays
     export_jobs: ExportJobs
+    kept: Kept
     studies: Studies

@@ -14,8 +14,8 @@ import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, fire_and_forget
 
 from app import worker
+from app.clock import BOOT_ID
 from app.config import Settings
-from app.event_log import BOOT_ID
 from registration_core import ObjectModel
 
 logger = logging.getLogger(__name__)

@@ -337,14 +337,15 @@ class OfflineSnap(Base):
     """What a snap gives from a pose that an operator passed through, computed afterwards."""
 
     __tablename__ = "offline_snaps"
-    __table_args__ = (UniqueConstraint("registration_id", "seconds", "config_hash"),)
+    __table_args__ = (UniqueConstraint("registration_id", "seconds", "input_hash"),)
     id: Mapped[int] = mapped_column(primary_key=True)
     registration_id: Mapped[int] = mapped_column(ForeignKey("registrations.id"))
     seconds: Mapped[float] = mapped_column(Float)
     """Of the trace, where the pose was."""
     T_world_object_start: Mapped[Pose]
-    config_hash: Mapped[str] = mapped_column(String(64))
-    """Of configuration, seed, frame and version: all that the result hangs on beside the pose."""
+    input_hash: Mapped[str] = mapped_column(String(64), index=True)
+    """Of pose, object, frame, configuration and version: all that the result hangs on. Equal inputs, such as
+    the poses of an object that rests, are computed once."""
     config: Mapped[dict[str, Any]]
     seed: Mapped[int] = mapped_column(BigInteger)
     T_world_object: Mapped[Pose | None]

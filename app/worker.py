@@ -59,7 +59,6 @@ class Job(ABC, Generic[Result]):
     camera: Intrinsics
     """Of that part."""
     config: SnapConfig
-    seed: int
 
     @abstractmethod
     def run(self, model: ObjectModel, tell: Tell) -> Result:
@@ -78,6 +77,7 @@ class JobResult:
 class SnapJob(Job[JobResult]):
     """A snap."""
 
+    seed: int
     T_camera_object: NDArray[np.float64]
     start_spread: tuple[float, float] | None
     """How far off T_camera_object may be, metres and radians; None where that is unknown."""
@@ -101,7 +101,7 @@ class SnapJob(Job[JobResult]):
             tell(step.iteration / max(1, step.iterations))
             estimate = step.estimate
         assert estimate is not None
-        return JobResult(estimate, _hardware())
+        return JobResult(estimate, hardware())
 
 
 @dataclass(frozen=True)
@@ -117,6 +117,7 @@ class Proposals:
 class SearchJob(Job[Proposals]):
     """A search for the object, without a start."""
 
+    seed: int
     region: tuple[int, int, int, int] | None
     """(left, top, width, height) in pixels, where to look; everywhere where it is None."""
 
@@ -126,7 +127,7 @@ class SearchJob(Job[Proposals]):
         started = time.perf_counter()
         rng = np.random.default_rng(self.seed)
         found = propose(model, self.depth, self.camera, self.region, self.config, rng)
-        return Proposals(found, time.perf_counter() - started, _hardware())
+        return Proposals(found, time.perf_counter() - started, hardware())
 
 
 def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None = None) -> Result | None:
@@ -191,5 +192,6 @@ def _keep(model: ObjectModel) -> None:
         _models.popitem(last=False)
 
 
-def _hardware() -> str:
+def hardware() -> str:
+    """Names the machine that this process computes on."""
     return f"{platform.machine()} {platform.processor() or 'cpu'} on {platform.node()}"

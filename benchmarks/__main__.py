@@ -15,6 +15,7 @@ from app.config import PROJECT
 from benchmarks import (
     ablation,
     commits,
+    curves,
     known,
     live,
     load,
@@ -23,6 +24,7 @@ from benchmarks import (
     registration,
     snap,
     startup,
+    study,
     techniques,
 )
 from benchmarks.figures import Figure, table
@@ -39,6 +41,8 @@ BENCHMARKS = {
     "registration": registration,
     "ablation": ablation,
     "known": known,
+    "study": study,
+    "curves": curves,
 }
 WORK_DIR = PROJECT / "test-results"
 """On the disk that the state directory is on by default: what a sync costs depends on it."""

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.ndimage import binary_erosion
 
 from app.scene_data import camera_of
-from benchmarks.hand import CLICK, CLOSE, DECIDE, KEY, next_stroke
+from app.study.hand import CLICK, CLOSE, DECIDE, KEY, next_stroke
 from benchmarks.operators import ENDED, Operator, Stream
 from benchmarks.registration.judging import Judge
 from benchmarks.scenes import KnownTask

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from rich.table import Table
 
-DIGITS = {"s": 3, "ms": 1, "%": 1, "times": 2, "actions": 1}
+DIGITS = {"s": 3, "ms": 1, "%": 1, "times": 2, "actions": 1, "°": 1}
 """Decimals shown by unit; of others none."""
 
 

@@ -6,13 +6,16 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.config import PROJECT
 from tests.app.waiting import LONGEST
+
+Command = Callable[..., subprocess.CompletedProcess[str]]
+"""Runs `snap6d` on a state directory with arguments, and with settings as keywords."""
 
 
 def environment(state_dir: Path) -> dict[str, str]:

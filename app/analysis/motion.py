@@ -1,6 +1,8 @@
 """A pose over time: knots, between which it moves evenly; a jump is two knots at one time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,39 +39,49 @@ class Motion:
 
 
 class MotionWriter:
-    """Puts knots together, in the order of time."""
+    """Puts knots together, in the order of time; one that comes late counts from when the one before did."""
 
     def __init__(self, T_start: ArrayLike) -> None:
-        self._rows: list[list[float]] = []
-        self._last = 0.0
+        self._seconds: list[float] = []
+        self._rows: list[Sequence[float]] = []
+        """Of each knot: any number, x, y, z, wxyz."""
+        self._poses: list[ArrayLike] = []
+        self._unfilled: list[list[float]] = []
+        """Poses (4, 4), and their rows, which are filled in all together at the end: one by one is slow."""
         self._present = self._row(T_start)
-        self._add(0.0, self._present)
+        self._add(0.0)
 
     def jump(self, seconds: float, T: ArrayLike) -> None:
         """From this time on the object is at the pose T (4, 4)."""
-        self._add(seconds, self._present)
+        self._add(seconds)
         self._present = self._row(T)
-        self._add(seconds, self._present)
+        self._add(seconds)
 
-    def follow(self, seconds: float, path: ArrayLike, T_end: ArrayLike) -> None:
+    def follow(self, seconds: float, path: Sequence[Sequence[float]], T_end: ArrayLike) -> None:
         """From this time on the object takes a path (N, 8): seconds since then, x, y, z, wxyz; to T_end."""
-        self._add(seconds, self._present)
-        for since, *row in np.asarray(path, dtype=np.float64).reshape(-1, 8).tolist():
-            self._add(seconds + since, row)
+        self._add(seconds)
+        self._seconds += [seconds + row[0] for row in path]
+        self._rows += path
         self._present = self._row(T_end)
-        self._add(self._last, self._present)
+        self._add(self._seconds[-1])
 
     def motion(self) -> Motion:
         """What was put together."""
-        rows = np.array(self._rows)
-        return Motion(rows[:, 0], rows[:, 1:4], rows[:, 4:])
+        matrices = np.array(self._poses, dtype=np.float64)
+        quaternions = Rotation.from_matrix(matrices[:, :3, :3]).as_quat(scalar_first=True)
+        numbers = np.column_stack([np.zeros(len(matrices)), matrices[:, :3, 3], quaternions])
+        for row, filled in zip(self._unfilled, numbers.tolist(), strict=True):
+            row[:] = filled
+        count = len(self._rows)
+        knots = np.fromiter(chain.from_iterable(self._rows), np.float64, 8 * count).reshape(count, 8)
+        return Motion(np.maximum.accumulate(self._seconds), knots[:, 1:4], knots[:, 4:])
 
-    def _add(self, seconds: float, row: list[float]) -> None:
-        self._last = max(seconds, self._last)
-        self._rows.append([self._last, *row])
+    def _add(self, seconds: float) -> None:
+        self._seconds.append(seconds)
+        self._rows.append(self._present)
 
-    @staticmethod
-    def _row(T: ArrayLike) -> list[float]:
-        matrix = np.asarray(T, dtype=np.float64)
-        quaternion = Rotation.from_matrix(matrix[:3, :3]).as_quat(scalar_first=True)
-        return [*matrix[:3, 3].tolist(), *quaternion.tolist()]
+    def _row(self, T: ArrayLike) -> list[float]:
+        row: list[float] = []
+        self._poses.append(T)
+        self._unfilled.append(row)
+        return row

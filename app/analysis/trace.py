@@ -95,6 +95,15 @@ class Trace:
             inside |= (times > span.start) & (times < span.end)
         return inside
 
+    def idle_before(self, seconds: ArrayLike) -> Array:
+        """How many seconds before each of these times (M,), since the first sight, were idle."""
+        times = np.asarray(seconds, dtype=np.float64)
+        total = np.zeros(len(times))
+        for span in self.idle:
+            start = max(span.start, self.first_sight)
+            total += np.clip(times - start, 0.0, max(0.0, span.end - start))
+        return total
+
 
 def until_submission(events: Sequence[Logged]) -> Sequence[Logged]:
     """The events up to the one that submitted or skipped, unless the registration was reopened since; what a

@@ -84,6 +84,7 @@ ServicesDep = Annotated[Services, Depends(get_services)]
 AnyoneDep = Annotated[Identity, Depends(signed_in)]
 """Participants of studies as well: the route looks after what is theirs."""
 IdentityDep = Annotated[Identity, Depends(at_least(Role.OPERATOR))]
+ReviewerDep = Annotated[Identity, Depends(at_least(Role.REVIEWER))]
 AdminDep = Annotated[Identity, Depends(at_least(Role.ADMIN))]
 LimitDep = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="Most items to return.")]
 AfterDep = Annotated[int, Query(ge=0, le=2**31 - 1, description="`next` of the page before.")]
@@ -140,6 +141,8 @@ Id = Annotated[int, Path(ge=1, le=2**31 - 1)]
 """Of a row, in a path."""
 QueryId = Annotated[int | None, Query(ge=1, le=2**31 - 1)]
 """Of a row, as a filter of a list."""
+Choice = Annotated[str | None, Query(max_length=500)]
+"""A name that something has to have; all where it is left out."""
 
 
 def my_seat(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> Seat:

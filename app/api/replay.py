@@ -56,6 +56,7 @@ class TraceOut(BaseModel):
     operator: Named
     state: str
     condition: str
+    is_simulated: bool = Field(description="whether a script took the operator's part, in simulated time")
     seconds: float
     first_sight: float
     events: list[TraceEvent]
@@ -127,6 +128,7 @@ def get_trace(registration_id: Id, services: ServicesDep, identity: IdentityDep)
         operator=Named(id=registration.user_id, name=registration.user.name),
         state=registration.state,
         condition=registration.task.condition,
+        is_simulated=recording.is_simulated,
         seconds=trace.duration,
         first_sight=trace.first_sight,
         events=_events_out(recording),

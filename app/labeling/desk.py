@@ -10,7 +10,6 @@ from typing import cast
 
 import numpy as np
 from sqlalchemy import select
-from sqlalchemy.orm import joinedload
 
 from app import __version__
 from app.auth import Identity, Role
@@ -33,9 +32,10 @@ from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.labeling.view import DragHandlers, SceneView
 from app.memory import give_back
+from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
-from app.tables import Condition, EstimateRow, Frame, Registration, Scene, Task
+from app.tables import Condition, EstimateRow, Frame, Registration, Task
 from app.worker import JobResult, Proposals, SearchJob, SnapJob
 from registration_core import ObjectModel, pose
 from registration_core.pose_error import mssd
@@ -251,6 +251,7 @@ class Desk:
             skip_reason=registration.skip_reason,
             known_objects=lambda: neighbours.known,
             request_search=request_search,
+            now=self._log.clock.monotonic,
             in_study=is_trial(registration),
         )
 
@@ -368,21 +369,6 @@ class Desk:
         coloring.update(state)
         seat.session.subscribe(coloring.update)
         return view
-
-
-def whole_registration(database: Database, registration_id: int) -> Registration | None:
-    """A registration with its task, object, scene and frames."""
-    with database.read() as session:
-        return session.scalar(
-            select(Registration)
-            .where(Registration.id == registration_id)
-            .options(
-                joinedload(Registration.task).joinedload(Task.object),
-                joinedload(Registration.task).joinedload(Task.scene).selectinload(Scene.frames),
-                joinedload(Registration.task).joinedload(Task.frame),
-                joinedload(Registration.user),
-            )
-        )
 
 
 class _Shown:

@@ -1,6 +1,6 @@
 """A drag under way: where it began, where it is, and the way between."""
 
-import time
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +14,20 @@ Array = NDArray[np.float64]
 
 
 class Drag:
-    """Follows T_world_object from the moment the gizmo is held; times are those of this process's clock."""
+    """Follows T_world_object from the moment the gizmo is held, on a clock that tells seconds."""
 
-    def __init__(self, T_world_object: Array, axes: GizmoAxes = "object") -> None:
+    def __init__(self, T_world_object: Array, axes: GizmoAxes, now: Callable[[], float]) -> None:
         self._T_start = T_world_object
         self._axes = axes
-        self._began = time.monotonic()
+        self._now = now
+        self._began = now()
         self._path = [[0.0, *_path_row(T_world_object)]]
         self.T_now = T_world_object
 
     def move(self, T_world_object: Array) -> None:
         """The object is here now."""
         self.T_now = T_world_object
-        self._path.append([round(time.monotonic() - self._began, 4), *_path_row(T_world_object)])
+        self._path.append([round(self._now() - self._began, 4), *_path_row(T_world_object)])
 
     def event(self, pivot: Array) -> NewEvent | None:
         """The drag as it is logged; None where it moved nothing.
@@ -44,7 +45,7 @@ class Drag:
             T_after=self.T_now.tolist(),
             dof=dof,
             path=self._path,
-            duration_seconds=time.monotonic() - self._began,
+            duration_seconds=self._now() - self._began,
             detail={"axes": self._axes},
         )
 

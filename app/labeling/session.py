@@ -92,6 +92,7 @@ class LabelingSession:
         request_search: Hands a search to the workers.
         skip_reason: Why it was skipped, where it was.
         known_objects: Tells what is known of other objects in the scene.
+        now: Tells the seconds that the paths of drags are written down with.
         in_study: Whether by a participant, who has only what the condition is named after.
     """
 
@@ -110,6 +111,7 @@ class LabelingSession:
         request_search: RequestSearch,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
+        now: Callable[[], float] = time.monotonic,
         in_study: bool = False,
     ) -> None:
         self.tools: frozenset[Tool] = tools_of(condition, in_study)
@@ -119,6 +121,7 @@ class LabelingSession:
         self._skip_reason = skip_reason
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
+        self._now = now
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
             registration_id,
@@ -196,7 +199,7 @@ class LabelingSession:
         with self._lock:
             if not self._is_open:
                 return
-            self._track.drag = Drag(self._track.history.current.T_world_object, self._gizmo_axes)
+            self._track.drag = Drag(self._track.history.current.T_world_object, self._gizmo_axes, self._now)
             self._changed()
 
     def drag_to(self, T_world_object: Array) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.trace import LoggedEvent, Span, Trace, moves, trace_of
+from app.clock import SIMULATED
 from app.labeling.viewpoint import Viewpoint, facing
 from app.tables import Pose
 
@@ -75,6 +76,11 @@ class Recording:
                 self._confidences.set(span.start if event.path else span.end, event.detail.get("confidence"))
             self._note_ghost(event, span)
         self._cameras = _camera_knots(cameras)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether a script took the operator's part, in simulated time."""
+        return any(event.boot_id.startswith(SIMULATED) for event in self.events)
 
     def at(self, seconds: float) -> Moment:
         """What there was to see so long after the first event."""

@@ -10,10 +10,11 @@ import numpy as np
 from app.analysis.trace import until_submission
 from app.database import Database
 from app.event_log import EventLog
-from app.labeling.desk import NotFoundError, whole_registration
+from app.labeling.desk import NotFoundError
 from app.labeling.frame_view import first_view_of, show_cloud_of
 from app.labeling.view import DragHandlers, SceneView
 from app.memory import give_back
+from app.registration_rows import whole_registration
 from app.replay.recording import Moment, Recording
 from app.scene_data import SceneData
 from app.tables import Frame, Registration

@@ -66,7 +66,7 @@ def upgrade() -> None:
         sa.Column("registration_id", sa.Integer(), nullable=False),
         sa.Column("seconds", sa.Float(), nullable=False),
         sa.Column("T_world_object_start", sa.JSON(none_as_null=True), nullable=False),
-        sa.Column("config_hash", sa.String(length=64), nullable=False),
+        sa.Column("input_hash", sa.String(length=64), nullable=False),
         sa.Column("config", sa.JSON(none_as_null=True), nullable=False),
         sa.Column("seed", sa.BigInteger(), nullable=False),
         sa.Column("T_world_object", sa.JSON(none_as_null=True), nullable=True),
@@ -78,5 +78,6 @@ def upgrade() -> None:
         sa.Column("hardware", sa.String(length=200), nullable=False),
         sa.ForeignKeyConstraint(["registration_id"], ["registrations.id"]),
         sa.PrimaryKeyConstraint("id"),
-        sa.UniqueConstraint("registration_id", "seconds", "config_hash"),
+        sa.UniqueConstraint("registration_id", "seconds", "input_hash"),
     )
+    op.create_index("ix_offline_snaps_input_hash", "offline_snaps", ["input_hash"])

@@ -21,6 +21,7 @@ try {
 async function showHome(me) {
   const isAdmin = me.role === "admin";
   for (const node of document.querySelectorAll(".admin-only")) node.hidden = !isAdmin;
+  for (const node of document.querySelectorAll(".reviewer-only")) node.hidden = !isAdmin && me.role !== "reviewer";
 
   const openAddTasks = () => addTasks.open(tasks.filter);
   const tasks = setUpTasks({ me, openAddTasks: isAdmin ? openAddTasks : null, onProblem: message.problem });

@@ -66,7 +66,7 @@ async function open() {
   }
 }
 
-function showNames({ dataset, scene, object }, { operator, condition, state, seconds }) {
+function showNames({ dataset, scene, object }, { operator, condition, state, is_simulated: simulated, seconds }) {
   document.title = `Replay of ${object.name} · Snap6D`;
   setText(byId("crumb-dataset"), dataset.name);
   setText(byId("crumb-scene"), scene.label);
@@ -74,7 +74,7 @@ function showNames({ dataset, scene, object }, { operator, condition, state, sec
   setText(byId("crumb-operator"), `Replay of ${operator.name}`);
   byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
   byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
-  setText(byId("about"), `${condition} · ${state}`);
+  setText(byId("about"), `${condition} · ${state}${simulated ? " · simulated" : ""}`);
   setText(byId("duration"), clockText(seconds));
 }
 

@@ -1,13 +1,12 @@
 /** The time line: signs of the events in lanes, idle stretches, and the curve above them. */
 
-import { byId, element } from "../dom.js";
+import { byId, element, svg } from "../dom.js";
 import { curvePaths, curveTicks } from "./curve.js";
 import { LANE_HEIGHT, laneTop, SIGNS } from "./signs.js";
 
 const CURVE_HEIGHT = 64;
 const HEIGHT = CURVE_HEIGHT + 3 * LANE_HEIGHT;
 const LEAST_LABELLED = 46; // pixels of an idle stretch that has room for its name
-const SVG = "http://www.w3.org/2000/svg";
 
 /** Draws a trace; returns `place(seconds)`, where a time lies, as a share of the width. */
 export function drawTimeLine(trace, onTime) {
@@ -71,11 +70,4 @@ function legendEntry({ name, lane, path, look }) {
 function idleEntry() {
   const box = svg("rect", { class: "idle", x: 1, y: 4, width: 14, height: 12 });
   return element("li", {}, svg("svg", { width: 16, height: LANE_HEIGHT, "aria-hidden": true }, box), "idle");
-}
-
-function svg(tag, attributes, ...children) {
-  const node = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  node.append(...children);
-  return node;
 }

@@ -1,41 +1,18 @@
 """The command line, as a person uses it."""
 
 import sqlite3
-import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 
-import app.cli
 from app.auth import Auth, Role
 from app.config import Settings
 from app.database import Database
 from app.importing import import_dataset
 from app.storage import FileStore
 from tests.app.export.site import make_site
-from tests.processes import failure, run_snap6d
-
-Command = Callable[..., CompletedProcess[str]]
-
-
-@pytest.fixture
-def snap6d(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Command:
-    """Runs a command to its end within this process, which is quicker."""
-
-    def run(state_dir: Path, *arguments: str, **variables: str) -> CompletedProcess[str]:
-        with monkeypatch.context() as patched:
-            for name, value in {"SNAP6D_STATE_DIR": str(state_dir), **variables}.items():
-                patched.setenv(name, value)
-            patched.setattr(sys, "argv", ["snap6d", *arguments])
-            with pytest.raises(SystemExit) as ended:
-                app.cli.main()
-                raise SystemExit(0)
-        return CompletedProcess(arguments, ended.value.code or 0, *capsys.readouterr())
-
-    return run
+from tests.processes import Command, failure, run_snap6d
 
 
 @pytest.fixture

@@ -8,8 +8,9 @@ import pytest
 from sqlalchemy import select
 
 from app.auth import Actor
+from app.clock import BOOT_ID
 from app.database import Database
-from app.event_log import BOOT_ID, EventLog, NewEvent
+from app.event_log import EventLog, NewEvent
 from app.importing import import_dataset
 from app.storage import FileStore
 from app.tables import EstimateRow, Registration, Task, User

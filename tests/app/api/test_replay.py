@@ -35,6 +35,7 @@ def test_the_trace_leads_from_the_start_to_what_was_submitted(una):
     trace = una.http.get(f"{url_of(una.id)}/trace").json()
     assert [event["kind"] for event in trace["events"]] == kinds_of(una)
     assert trace["operator"]["name"] == "una of the replay" and trace["state"] == "submitted"
+    assert not trace["is_simulated"]
     assert trace["seconds"] == trace["events"][-1]["end"]
     assert trace["curve"]["translation"][-1] == 0.0
     assert trace["curve"]["translation"][0] == pytest.approx(0.04, abs=1e-4)

@@ -1,0 +1,102 @@
+"""The curves of each group, mode, condition and error, with all that is read off them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.analysis.curves import MARGINS, Curve, Timing, curve_of, human_times, stg_times
+from app.analysis.fitts import Fitts, fitts
+from app.analysis.hand_off import HandOff, hand_off
+from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
+
+Array = NDArray[np.float64]
+Unit = Callable[[TrialTrace], str]
+"""What counts once in means and intervals: an operator; a registration where there is one operator only."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A curve and where it comes from."""
+
+    curve: Curve
+    registration_ids: tuple[int | None, ...]
+    """(K,), whose time is nearest to the mean; None where nobody comes within the margin."""
+    fitts: Fitts | None
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """What operators of one group did in one mode under one condition, judged by one error."""
+
+    group: str
+    mode: str
+    condition: str
+    error: ErrorKind
+    operators: int
+    trials: int
+    human: Drawn
+    """As it was done; by hand alone where the condition is manual."""
+    stg: Drawn | None
+    """None where no snap was computed."""
+    hand_off: HandOff | None
+
+
+def operator_of(trial: TrialTrace) -> str:
+    """Operators count once each."""
+    return trial.operator
+
+
+def cells_of(trials: Sequence[TrialTrace], timing: Timing, seed: int, unit: Unit = operator_of) -> list[Cell]:
+    """The cells that have trials, in the order of groups, modes and conditions as they first come."""
+    keys = dict.fromkeys((trial.group, trial.mode, trial.condition) for trial in trials)
+    distances = {kind: _distance(trials, kind) for kind in ERROR_KINDS}
+    return [
+        _cell([trial for trial in trials if key_of(trial) == key], kind, distances[kind], timing, seed, unit)
+        for key, kind in product(keys, ERROR_KINDS)
+    ]
+
+
+def key_of(trial: TrialTrace) -> tuple[str, str, str]:
+    """Group, mode and condition."""
+    return trial.group, trial.mode, trial.condition
+
+
+def _cell(
+    trials: Sequence[TrialTrace], kind: ErrorKind, distance: float, timing: Timing, seed: int, unit: Unit
+) -> Cell:
+    units = [unit(trial) for trial in trials]
+    human = human_times(trials, kind, timing)
+    stg = stg_times(trials, kind, timing) if any(trial.has_stg for trial in trials) else None
+    group, mode, condition = key_of(trials[0])
+    return Cell(
+        group=group,
+        mode=mode,
+        condition=condition,
+        error=kind,
+        operators=len({trial.operator for trial in trials}),
+        trials=len(trials),
+        human=_drawn(human, trials, units, kind, distance, seed),
+        stg=None if stg is None else _drawn(stg, trials, units, kind, distance, seed),
+        hand_off=None if stg is None else hand_off(human, stg, units, MARGINS[kind], seed),
+    )
+
+
+def _drawn(
+    times: Array,
+    trials: Sequence[TrialTrace],
+    units: Sequence[str],
+    kind: ErrorKind,
+    distance: float,
+    seed: int,
+) -> Drawn:
+    curve = curve_of(times, units, MARGINS[kind], seed)
+    ids = tuple(None if i < 0 else trials[i].registration_id for i in curve.typical.tolist())
+    return Drawn(curve, ids, fitts(curve, distance, seed))
+
+
+def _distance(trials: Sequence[TrialTrace], kind: ErrorKind) -> float:
+    """The fixed distance of Fitts' law: the median error at first sight, over all trials."""
+    return float(np.median([trial.of_kind(kind)[0] for trial in trials])) if trials else np.nan

@@ -1,0 +1,209 @@
+"""A study out of the database: the trace of each trial, and what was left out and why."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from sqlalchemy import Text, cast, select
+from sqlalchemy.orm import Session
+
+from app.analysis.ground_truth import GroundTruth, given_truth, mean_truth
+from app.analysis.log_faults import faults_of
+from app.analysis.logs import LoggedRow, decoded_pose, read_logs
+from app.analysis.pose_errors import PoseErrors, pose_errors
+from app.analysis.remarks import Remark, counted
+from app.analysis.runs import Place, Run, about_participants, place_name, runs_of, symmetries_of
+from app.analysis.trace import trace_of, until_submission
+from app.analysis.trial import TrialTrace, traced, without_snaps
+from app.database import Database
+from app.tables import OfflineSnap, Participant, Pose, Registration, Study
+
+Array = NDArray[np.float64]
+TruthSource = Literal["operators", "reference"]
+SnapsBySecond = dict[float, Pose | None]
+"""Of a registration, by the second of the trace, rounded; None where the snap failed."""
+
+SECOND_DIGITS = 6
+"""Decimals to which the time of a sample and that of its snap agree."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceTruth:
+    """The ground truth of one object in one scene, for the report."""
+
+    name: str
+    truth: GroundTruth
+    from_reference: PoseErrors | None
+    """(1,) each: how far the mean is from the given pose, where there are both."""
+
+
+@dataclass(frozen=True, eq=False)
+class Collected:
+    """All that a report is made of."""
+
+    study_id: int
+    name: str
+    is_simulated: bool
+    groups: Mapping[str, int]
+    """Operators who did not withdraw, by group; 0 for a group of the plan that has none."""
+    trials: Sequence[TrialTrace]
+    truths: Sequence[PlaceTruth]
+    remarks: Sequence[Remark]
+
+
+def trials_of(database: Database, study_id: int, source: TruthSource = "operators") -> Collected:
+    """The traces of all trials of a study that count.
+
+    Args:
+        database: With the log.
+        study_id: Whose trials.
+        source: Whether the mean of the accurate registrations by hand is the truth, or the given reference
+            pose; where a place has only the other one, that one is, and it is remarked.
+
+    Raises:
+        LookupError: where there is no such study.
+    """
+    with database.read() as session:
+        study = session.get(Study, study_id)
+        if study is None:
+            raise LookupError(f"There is no study {study_id}.")
+        participants = session.scalars(
+            select(Participant).where(Participant.study_id == study_id).order_by(Participant.id)
+        ).all()
+        runs, remarks = runs_of(session, study_id)
+        snaps = _snaps(session, study_id)
+    remarks = [*about_participants(study, participants), *remarks, *_about_snaps(snaps)]
+    truths = _truths(runs, source, remarks)
+    trials = _trials(database, runs, truths, snaps, remarks)
+    present = [participant.group for participant in participants if participant.withdrawn_at is None]
+    return Collected(
+        study_id=study_id,
+        name=study.name,
+        is_simulated=study.is_simulated or any(trial.is_simulated for trial in trials),
+        groups={
+            name: present.count(name) for name in dict.fromkeys([*study.plan.get("groups", {}), *present])
+        },
+        trials=trials,
+        truths=list(truths.values()),
+        remarks=remarks,
+    )
+
+
+def _truths(runs: Sequence[Run], source: TruthSource, remarks: list[Remark]) -> dict[Place, PlaceTruth]:
+    of_place: dict[Place, list[Run]] = defaultdict(list)
+    for run in runs:
+        of_place[run.place].append(run)
+    truths = {}
+    for place, here in of_place.items():
+        name = place_name(here[0].task)
+        truth, text = _truth(here, source)
+        if text:
+            remarks.append(Remark(name, text))
+        if truth is not None:
+            truths[place] = PlaceTruth(name, truth, _from_reference(here[0], truth))
+    return truths
+
+
+def _truth(here: Sequence[Run], source: TruthSource) -> tuple[GroundTruth | None, str]:
+    """The truth of one place from the runs there, and what there is to say of it."""
+    task = here[0].task
+    reference = next((run.task.T_world_object_reference for run in here), None)
+    by_hand = [
+        run.registration.T_world_object
+        for run in here
+        if run.task.condition == "manual" and run.task.mode == "accurate"
+    ]
+    if by_hand and (source == "operators" or reference is None):
+        text = "" if source == "operators" else "has no reference pose; the mean by hand is its ground truth"
+        return mean_truth(np.array(by_hand), symmetries_of(task.object)), text
+    if reference is not None:
+        text = "has no accurate registration by hand; its reference pose is the ground truth"
+        return given_truth(np.array(reference)), text if source == "operators" else ""
+    left_out = f"{counted(len(here), 'trial')} left out"
+    return (
+        None,
+        f"has no ground truth, neither accurate registrations by hand nor a reference pose; {left_out}",
+    )
+
+
+def _from_reference(run: Run, truth: GroundTruth) -> PoseErrors | None:
+    reference = run.task.T_world_object_reference
+    if reference is None or not truth.count:
+        return None
+    return pose_errors(truth.T_world_object[None], np.array(reference), symmetries_of(run.task.object))
+
+
+def _trials(
+    database: Database,
+    runs: Sequence[Run],
+    truths: Mapping[Place, PlaceTruth],
+    snaps: Mapping[int, SnapsBySecond],
+    remarks: list[Remark],
+) -> list[TrialTrace]:
+    counting = {run.registration.id: run for run in runs if run.place in truths}
+    symmetries = {run.task.object_id: symmetries_of(run.task.object) for run in counting.values()}
+    logs_missing = dict(counting)
+    trials = []
+    for registration_id, rows in read_logs(database, list(counting)):
+        run = logs_missing.pop(registration_id)
+        faults = faults_of(rows)
+        remarks += [
+            Remark(run.about, fault.text + ("; left out" if fault.spoils_times else ""), registration_id)
+            for fault in faults
+        ]
+        if not any(fault.spoils_times for fault in faults):
+            T_truth = truths[run.place].truth.T_world_object
+            of_object = symmetries[run.task.object_id]
+            trials.append(_trial(run, rows, T_truth, of_object, snaps.get(registration_id, {})))
+    remarks += [
+        Remark(run.about, "has no log; left out", run.registration.id) for run in logs_missing.values()
+    ]
+    return trials
+
+
+def _trial(
+    run: Run, rows: Sequence[LoggedRow], T_truth: Array, symmetries: Array, snaps: SnapsBySecond
+) -> TrialTrace:
+    trace = trace_of(run.task.T_world_object_start, until_submission(rows))
+    times = trace.sample_times()
+    errors = pose_errors(trace.motion.at(times), T_truth, symmetries)
+    stg_errors = without_snaps(len(times))
+    found = [(i, T) for i, second in enumerate(times.tolist()) if (T := snaps.get(_key(second))) is not None]
+    if found:
+        places = [i for i, _ in found]
+        stg = pose_errors(np.array([T for _, T in found]), T_truth, symmetries)
+        stg_errors.translation[places] = stg.translation
+        stg_errors.rotation[places] = stg.rotation
+    return traced(run.info, trace, times, errors, stg_errors)
+
+
+def _snaps(session: Session, study_id: int) -> dict[int, SnapsBySecond]:
+    """The offline snaps of a study by registration; of several from one pose the newest counts."""
+    query = (
+        select(OfflineSnap.registration_id, OfflineSnap.seconds, cast(OfflineSnap.T_world_object, Text))
+        .join(Registration, OfflineSnap.registration_id == Registration.id)
+        .join(Participant, Participant.user_id == Registration.user_id)
+        .where(Participant.study_id == study_id)
+        .order_by(OfflineSnap.id)
+    )
+    snaps: dict[int, SnapsBySecond] = defaultdict(dict)
+    for registration_id, seconds, text in session.execute(query):
+        snaps[registration_id][_key(seconds)] = decoded_pose(text)
+    return snaps
+
+
+def _about_snaps(snaps: Mapping[int, SnapsBySecond]) -> list[Remark]:
+    results = [T for of_registration in snaps.values() for T in of_registration.values()]
+    failed = sum(T is None for T in results)
+    if not results:
+        return [Remark("offline snaps", "none were computed; there are no STG curves")]
+    return [Remark("offline snaps", f"{failed} of {len(results)} failed; they come within no margin")] * bool(
+        failed
+    )
+
+
+def _key(seconds: float) -> float:
+    return round(seconds, SECOND_DIGITS)

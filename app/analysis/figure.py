@@ -1,0 +1,158 @@
+"""The figure of a report, in the layout of the paper's Figure 2; the same bytes for the same numbers.
+
+Error margin from large to small, seconds on the left axis, share of trials that come within it on the right
+one; a column a group, a row an error. Red and solid is the human, blue and dashed is STG; accurate is thick,
+quick is thin and dotted with marks.
+"""
+
+import io
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from app.analysis.cells import Cell, Drawn
+from app.analysis.report import Report
+from app.analysis.trial import ERROR_KINDS, ErrorKind
+from app.analysis.units import UNITS, in_people_units
+
+FigureFormat = Literal["svg", "pdf"]
+
+HUMAN, STG = "#b4231a", "#0b62a8"
+Style = Literal["-", "--"]
+PANEL = (4.2, 3.1)
+"""Inches."""
+SETTINGS: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 9,
+    "svg.fonttype": "none",  # texts stay texts
+    "svg.hashsalt": "snap6d",  # else names inside are random
+    "pdf.fonttype": 42,
+}
+TICKS: dict[ErrorKind, Sequence[float]] = {
+    "translation": (100, 50, 20, 10, 5, 2, 1),
+    "rotation": (90, 45, 20, 10, 5, 2, 1),
+}
+"""Millimetres and degrees."""
+_lock = threading.Lock()
+"""matplotlib's settings are everybody's."""
+
+
+def figure_bytes(report: Report, file_format: FigureFormat) -> bytes:
+    """The figure of a report as a file."""
+    sink = io.BytesIO()
+    dates = {"Date": None} if file_format == "svg" else {"CreationDate": None, "ModDate": None}
+    with _lock, mpl.rc_context(SETTINGS):
+        draw(report).savefig(sink, format=file_format, metadata=dates)
+    return sink.getvalue()
+
+
+def draw(report: Report) -> Figure:
+    """Panels of one condition: of `manual`, or where there is none, of the first."""
+    condition = shown_condition(report)
+    cells = [cell for cell in report.cells if cell.condition == condition]
+    groups = list(report.collected.groups) or [""]
+    figure = Figure((PANEL[0] * len(groups), PANEL[1] * len(ERROR_KINDS) + 0.9), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(len(ERROR_KINDS), len(groups), squeeze=False)
+    for row, kind in zip(panels, ERROR_KINDS, strict=True):
+        for panel, group in zip(row, groups, strict=True):
+            here = [cell for cell in cells if cell.group == group and cell.error == kind]
+            _draw_panel(panel, here, kind, f"{group}, {kind}")
+    figure.suptitle(_title(report, condition))
+    figure.legend(handles=list(_legend(cells)), loc="outside lower center", ncols=4, frameon=False)
+    if report.collected.is_simulated:
+        figure.text(
+            0.5,
+            0.5,
+            "simulated",
+            fontsize=44,
+            color="#777777",
+            alpha=0.22,
+            rotation=25,
+            ha="center",
+            va="center",
+        )
+    return figure
+
+
+def shown_condition(report: Report) -> str:
+    """The condition that the figure shows."""
+    conditions = [cell.condition for cell in report.cells]
+    return "manual" if "manual" in conditions or not conditions else conditions[0]
+
+
+def _title(report: Report, condition: str) -> str:
+    simulated = " (simulated operators)" if report.collected.is_simulated else ""
+    return f"{report.collected.name}: {condition}{simulated}"
+
+
+def _draw_panel(panel: Axes, cells: Sequence[Cell], kind: ErrorKind, title: str) -> None:
+    panel.set_title(title, fontsize=10)
+    shares = panel.twinx()
+    panel.set_zorder(shares.get_zorder() + 1)
+    panel.patch.set_visible(False)
+    for cell in cells:
+        _draw_curve(panel, shares, cell.human, cell, HUMAN, "-")
+        if cell.stg is not None:
+            _draw_curve(panel, shares, cell.stg, cell, STG, "--")
+    panel.set_xscale("log")
+    panel.set_xlim(TICKS[kind][0], TICKS[kind][-1])
+    panel.set_xticks(TICKS[kind])
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
+    panel.set_ylim(bottom=0.0)
+    shares.set_ylim(0.0, 1.0)
+    shares.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.0f} %"))
+    panel.set_xlabel(f"error margin [{UNITS[kind]}]")
+    panel.set_ylabel("seconds to come within it")
+    shares.set_ylabel("remaining", color="#666666")
+    if not cells:
+        panel.text(0.5, 0.5, "no operators", transform=panel.transAxes, ha="center", color="#666666")
+
+
+def _draw_curve(panel: Axes, shares: Axes, drawn: Drawn, cell: Cell, color: str, style: Style) -> None:
+    curve = drawn.curve
+    x = np.array([in_people_units(margin, cell.error) for margin in curve.margins.tolist()])
+    is_quick = cell.mode == "quick"
+    shares.fill_between(x, curve.share, color=color, alpha=0.07, linewidth=0)
+    panel.fill_between(x, curve.low, curve.high, color=color, alpha=0.16, linewidth=0)
+    panel.plot(
+        x,
+        curve.mean,
+        color=color,
+        linestyle=style,
+        linewidth=1.2 if is_quick else 2.0,
+        marker="o" if is_quick else None,
+        markersize=3,
+        markevery=4,
+    )
+
+
+def _legend(cells: Sequence[Cell]) -> Iterator[Line2D | Patch]:
+    hands: list[tuple[str, str, Style]] = [("human", HUMAN, "-")]
+    if any(cell.stg for cell in cells):
+        hands.append(("STG", STG, "--"))
+    for hand, color, style in hands:
+        for mode in dict.fromkeys(cell.mode for cell in cells):
+            is_quick = mode == "quick"
+            yield Line2D(
+                [],
+                [],
+                color=color,
+                linestyle=style,
+                linewidth=1.2 if is_quick else 2.0,
+                marker="o" if is_quick else None,
+                markersize=3,
+                label=f"{hand}, {mode}",
+            )
+    yield Patch(color="#777777", alpha=0.3, label="95 % interval over operators")
+    yield Patch(color="#777777", alpha=0.1, label="share that comes within the margin")

@@ -1,0 +1,55 @@
+"""At which error an operator should let the machine take over: where the STG curve leaves the human one."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.analysis.bootstrap import bounds, by_operator, resampled_means
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HandOff:
+    """From this error on, towards smaller ones, a snap saves time."""
+
+    margin: float
+    """Metres or radians."""
+    best_margin: float
+    """Where it saves most."""
+    saved: float
+    """Seconds there, mean over the operators who come within it both ways."""
+    saved_interval: tuple[float, float]
+    operators: int
+
+
+def hand_off(human: Array, stg: Array, operators: Sequence[str], margins: Array, seed: int) -> HandOff | None:
+    """Compare times (T, K) of the same trials by hand and by snap, trial by trial.
+
+    From the margin where the snap saves most, go to larger margins for as long as the 95 % interval of the
+    saved seconds lies above 0: the last one is where the curves part.
+
+    Returns:
+        None where a snap saves nothing for sure at the margin where it saves most.
+    """
+    saved = by_operator(human - stg, operators).means
+    known = np.isfinite(saved)
+    count = known.sum(axis=0)
+    low, high = bounds(resampled_means(saved, seed), count)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(known, saved, 0.0).sum(axis=0) / count
+    ahead = np.nan_to_num(low, nan=-1.0) > 0.0
+    best = int(np.where(count >= 2, mean, -np.inf).argmax())
+    if not ahead[best]:
+        return None
+    behind = np.flatnonzero(~ahead[:best])
+    first = int(behind[-1]) + 1 if len(behind) else 0
+    return HandOff(
+        margin=float(margins[first]),
+        best_margin=float(margins[best]),
+        saved=float(mean[best]),
+        saved_interval=(float(low[best]), float(high[best])),
+        operators=int(count[best]),
+    )

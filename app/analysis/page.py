@@ -1,0 +1,228 @@
+"""A report as one HTML file that opens anywhere: no script, nothing from elsewhere."""
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from app.analysis.bootstrap import RESAMPLES, Interval
+from app.analysis.figure import figure_bytes
+from app.analysis.pose_errors import PoseErrors
+from app.analysis.remarks import counted
+from app.analysis.report import Report
+from app.analysis.units import interval_told, number_told, share_told, told
+
+STYLE = """
+:root { color-scheme: light dark; --line: #d9dad6; --soft: #f4f4f1; }
+@media (prefers-color-scheme: dark) { :root { --line: #3a4047; --soft: #24282d; } }
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1.5rem; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }
+table { border-collapse: collapse; display: block; overflow-x: auto; }
+th, td { text-align: left; padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line);
+  font-variant-numeric: tabular-nums; }
+figure { margin: 1rem 0; padding: 1rem; background: #fff; } figure svg { width: 100%; height: auto; }
+.simulated { padding: .6rem 1rem; border-left: 4px solid #c99a2c; background: var(--soft); font-weight: 600; }
+"""
+
+
+def page_of(report: Report) -> str:
+    """The page, UTF-8."""
+    title = escape(f"{report.collected.name}: report")
+    svg = figure_bytes(report, "svg").decode()
+    parts = [
+        f"<h1>{title}</h1>",
+        _simulated(report),
+        f"<p>{_counts(report)}</p>",
+        f"<figure>{svg[svg.index('<svg') :]}</figure>",
+        _section("Does a snap improve rotation as well?", _answers(report), _gains(report)),
+        _section("Hand-off", [], _hand_offs(report)),
+        _section("Fitts' law: time = a + b log2(D/W + 1)", [], _fitts(report)),
+        _section("Conditions in pairs", [], _comparisons(report)),
+        _section("Ground truth", [], _truths(report)),
+        _section(
+            "What was left out or handled", [str(remark) for remark in report.remarks] or ["Nothing."], ""
+        ),
+        _section("How the numbers are made", _method(report), ""),
+    ]
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
+        f"<style>{STYLE}</style>\n</head>\n<body>\n" + "\n".join(filter(None, parts)) + "\n</body>\n</html>\n"
+    )
+
+
+def _simulated(report: Report) -> str:
+    if not report.collected.is_simulated:
+        return ""
+    return '<p class="simulated">Simulated: in this study scripts stand in for people.</p>'
+
+
+def _counts(report: Report) -> str:
+    groups = ", ".join(
+        f"{escape(name)}: {counted(count, 'operator')}" for name, count in report.collected.groups.items()
+    )
+    return f"{counted(len(report.collected.trials), 'trial')} count. {groups}."
+
+
+def _answers(report: Report) -> list[str]:
+    return [gain.sentence for gain in report.gains if gain.error == "rotation"]
+
+
+def _gains(report: Report) -> str:
+    return _table(
+        (
+            "group",
+            "mode",
+            "condition",
+            "error",
+            "from",
+            "before",
+            "after",
+            "gain",
+            "better",
+            "operators",
+            "verdict",
+        ),
+        (
+            (
+                gain.group,
+                gain.mode,
+                gain.condition,
+                gain.error,
+                gain.moment,
+                interval_told(gain.before, gain.error),
+                interval_told(gain.after, gain.error),
+                interval_told(gain.gain, gain.error),
+                share_told(gain.improved),
+                gain.gain.operators,
+                gain.verdict,
+            )
+            for gain in report.gains
+        ),
+    )
+
+
+def _hand_offs(report: Report) -> str:
+    return _table(
+        (
+            "group",
+            "mode",
+            "condition",
+            "error",
+            "let the machine take over from",
+            "saves most at",
+            "seconds saved there",
+        ),
+        (
+            (
+                cell.group,
+                cell.mode,
+                cell.condition,
+                cell.error,
+                told(cell.hand_off.margin, cell.error)
+                if cell.hand_off
+                else "no margin: nothing is saved for sure",
+                told(cell.hand_off.best_margin, cell.error) if cell.hand_off else "–",
+                interval_told(
+                    Interval(cell.hand_off.saved, *cell.hand_off.saved_interval, cell.hand_off.operators),
+                    None,
+                )
+                if cell.hand_off
+                else "–",
+            )
+            for cell in report.cells
+            if cell.stg is not None
+        ),
+    )
+
+
+def _fitts(report: Report) -> str:
+    return _table(
+        ("group", "mode", "condition", "error", "by", "D", "margins", "a", "b", "R²", "bits/s"),
+        (
+            (
+                cell.group,
+                cell.mode,
+                cell.condition,
+                cell.error,
+                hand,
+                told(line.distance, cell.error),
+                line.margins,
+                interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
+                interval_told(Interval(line.b, *line.b_interval, cell.operators), None) + " a bit",
+                number_told(line.r_squared),
+                number_told(line.throughput),
+            )
+            for cell in report.cells
+            for hand, drawn in (("human", cell.human), ("STG", cell.stg))
+            if drawn is not None and (line := drawn.fitts) is not None
+        ),
+    )
+
+
+def _comparisons(report: Report) -> str:
+    return _table(
+        ("mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"),
+        (
+            (
+                pair.mode,
+                f"{pair.second} − {pair.first}",
+                pair.pairs,
+                pair.seconds.operators,
+                interval_told(pair.seconds, None),
+                interval_told(pair.translation, "translation"),
+                interval_told(pair.rotation, "rotation"),
+            )
+            for pair in report.comparisons
+        ),
+    )
+
+
+def _truths(report: Report) -> str:
+    return _table(
+        ("object", "registrations", "spread", "off the reference"),
+        (
+            (
+                place.name,
+                place.truth.count or "given",
+                f"{told(place.truth.translation_spread, 'translation')},"
+                f" {told(place.truth.rotation_spread, 'rotation')}",
+                _off(place.from_reference),
+            )
+            for place in report.collected.truths
+        ),
+    )
+
+
+def _off(errors: PoseErrors | None) -> str:
+    if errors is None:
+        return "–"
+    return (
+        f"{told(float(errors.translation[0]), 'translation')}, {told(float(errors.rotation[0]), 'rotation')}"
+    )
+
+
+def _method(report: Report) -> list[str]:
+    config = report.config
+    return [
+        f"Each offline snap is charged with {config.snap_seconds:g} s.",
+        "Idle time is left out." if config.without_idle else "Idle time counts.",
+        "The ground truth of an object is the mean of the accurate registrations by hand."
+        if config.truth == "operators"
+        else "The ground truth of an object is its given reference pose.",
+        f"Intervals hold 95 %, by {RESAMPLES} bootstrap resamples of operators with seed {config.seed}.",
+        "Means are over operators who come within a margin; shares are of all their trials.",
+    ]
+
+
+def _section(title: str, sentences: Sequence[str], table: str) -> str:
+    if not sentences and not table:
+        return ""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f"<h2>{escape(title)}</h2>" + (f"<ul>{items}</ul>" if items else "") + table
+
+
+def _table(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Empty where there are no rows."""
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in names)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(str(value))}</td>" for value in row) + "</tr>" for row in rows
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>" if body else ""

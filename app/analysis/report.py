@@ -1,0 +1,113 @@
+"""The report of a study: from the database to curves and all that is read off them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from app.analysis.cells import Cell, cells_of, key_of
+from app.analysis.collect import Collected, TruthSource, trials_of
+from app.analysis.comparison import Comparison, comparisons
+from app.analysis.curves import MARGINS, SNAP_SECONDS, Timing
+from app.analysis.gains import Gain, gains
+from app.analysis.remarks import Remark
+from app.analysis.trial import ERROR_KINDS, TrialTrace
+from app.analysis.units import told
+from app.database import Database
+
+
+@dataclass(frozen=True)
+class ReportConfig:
+    """How a report is computed; stated in it."""
+
+    snap_seconds: float = SNAP_SECONDS
+    """That each offline snap is charged with."""
+    without_idle: bool = False
+    """Whether idle time is left out."""
+    truth: TruthSource = "operators"
+    seed: int = 0
+    """Of the bootstrap."""
+
+    @property
+    def timing(self) -> Timing:
+        """How time is counted."""
+        return Timing(self.snap_seconds, self.without_idle)
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """All numbers of a study, or of a part of it."""
+
+    collected: Collected
+    config: ReportConfig
+    cells: Sequence[Cell]
+    gains: Sequence[Gain]
+    comparisons: Sequence[Comparison]
+    remarks: Sequence[Remark]
+
+
+def study_report(database: Database, study_id: int, config: ReportConfig | None = None) -> Report:
+    """The report of a whole study.
+
+    Raises:
+        LookupError: where there is no such study.
+    """
+    config = config or ReportConfig()
+    return report_of(trials_of(database, study_id, config.truth), config)
+
+
+def report_of(collected: Collected, config: ReportConfig) -> Report:
+    """The report of what was collected."""
+    trials = sorted(collected.trials, key=_order(collected))
+    return Report(
+        collected=replace(collected, trials=trials),
+        config=config,
+        cells=cells_of(trials, config.timing, config.seed),
+        gains=[gain for _, part in groupby(trials, key=key_of) for gain in gains(list(part), config.seed)],
+        comparisons=comparisons(trials, config.timing, config.seed),
+        remarks=[*collected.remarks, *_never_within(trials)],
+    )
+
+
+def write_report(report: Report, folder: Path) -> list[Path]:
+    """Write figure, tables and the one-file page into a folder, the same bytes for the same log.
+
+    Returns:
+        The files.
+    """
+    from app.analysis.report_files import file_names, file_of  # what draws takes a second to import
+
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / name for name in file_names()]
+    for path in paths:
+        path.write_bytes(file_of(report, path.name))
+    return paths
+
+
+def _order(collected: Collected) -> Callable[[TrialTrace], tuple[int, str, bool, str, int]]:
+    """Groups as the study has them, then modes, then conditions with the baseline first."""
+    groups = list(collected.groups)
+    return lambda trial: (
+        groups.index(trial.group),
+        trial.mode,
+        trial.condition != "manual",
+        trial.condition,
+        trial.registration_id,
+    )
+
+
+def _never_within(trials: Sequence[TrialTrace]) -> list[Remark]:
+    """Trials that come within no margin at all: they count in the shares, in no mean."""
+    return [
+        Remark(
+            f"{trial.operator}, {trial.scene}, {trial.object}, {trial.mode}, {trial.condition}",
+            f"never came within the largest margin of {kind}, {told(float(MARGINS[kind][0]), kind)}:"
+            f" counts among those who do not reach a margin, and in no mean",
+            trial.registration_id,
+        )
+        for trial in trials
+        for kind in ERROR_KINDS
+        if np.nanmin(trial.of_kind(kind)) > MARGINS[kind][0]
+    ]

@@ -1,0 +1,189 @@
+"""Offline snaps: what a snap gives from every pose that operators passed through, computed afterwards.
+
+The batch may be stopped at any time, by SIGKILL too, and started again: what is stored is not computed again,
+and the rest comes out the same, for a snap's seed hangs on its input alone.
+"""
+
+import uuid
+from collections import defaultdict
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby, islice
+from queue import SimpleQueue
+
+import numpy as np
+
+from app import __version__
+from app.database import Database
+from app.scene_data import SceneData, camera_of
+from app.snapping import SnapError, Snapper
+from app.study.samples import Sample, samples_of
+from app.study.snap_batch import BatchResult, BatchStart, SnapBatch
+from app.study.snap_store import Outcome, SnapStore
+from registration_core import SnapConfig, pose
+
+SNAPS_AT_ONCE = 16
+"""In one job of a worker, which takes about a second then."""
+JOBS_A_WORKER = 2
+"""That are under way or wait at a worker, so that it never has to."""
+PRIORITY = -2
+"""After whatever operators wait for or look at."""
+
+Input = Sequence[Sample]
+"""Samples that one snap stands for."""
+Result = BatchResult | SnapError
+Ended = tuple[str, Sequence[Input], Result]
+"""A job's id, what it was for, and what it came to."""
+
+
+class OfflineError(Exception):
+    """The batch cannot go on; the message says why and may be shown."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a batch did."""
+
+    samples: int
+    """In all."""
+    computed: int
+    """Snaps, each for all samples of its input."""
+    failed: int
+    """Of all samples."""
+
+
+class OfflineBatch:
+    """Computes and stores the offline snaps of registrations.
+
+    Args:
+        database: With their logs.
+        data: With their images and objects.
+        snapper: Whose workers compute.
+        config: Of the snaps.
+    """
+
+    def __init__(
+        self, database: Database, data: SceneData, snapper: Snapper, config: SnapConfig | None = None
+    ) -> None:
+        self._database = database
+        self._store = SnapStore(database)
+        self._data = data
+        self._snapper = snapper
+        self._config = config or SnapConfig()
+
+    def run(self, registration_ids: Sequence[int], on_progress: Callable[[int, int], None]) -> Summary:
+        """Compute and store what is missing.
+
+        Args:
+            registration_ids: Whose samples; they must not change meanwhile.
+            on_progress: Told how many samples have their snap, and of how many.
+
+        Raises:
+            OfflineError: where the workers cannot be reached, or one of them died.
+            StoreError: where another batch does the same.
+        """
+        total, missing = self._missing(registration_ids)
+        known = self._store.outcomes([samples[0].input_hash for samples in missing])
+        unknown = [samples for samples in missing if samples[0].input_hash not in known]
+        copies = [
+            (one, known[one.input_hash]) for samples in missing for one in samples if one.input_hash in known
+        ]
+        if copies:
+            self._store.add(copies)
+        done = total - sum(map(len, unknown))
+        on_progress(done, total)
+        with closing(self._computed(unknown)) as results:
+            for inputs, result in results:
+                self._store.add(self._snaps(inputs, result))
+                done += sum(map(len, inputs))
+                on_progress(done, total)
+        return Summary(total, len(unknown), self._store.failures(registration_ids))
+
+    def _missing(self, registration_ids: Sequence[int]) -> tuple[int, list[Input]]:
+        """How many samples there are, and those without their snap, by input; those of a view together."""
+        inputs: dict[str, list[Sample]] = defaultdict(list)
+        total = 0
+        for registration_id in registration_ids:
+            stored = self._store.stored(registration_id)
+            for sample in samples_of(self._database, registration_id, self._config):
+                total += 1
+                if (sample.seconds, sample.input_hash) not in stored:
+                    inputs[sample.input_hash].append(sample)
+        return total, sorted(inputs.values(), key=_view_of)
+
+    def _computed(self, inputs: Sequence[Input]) -> Generator[tuple[Sequence[Input], BatchResult]]:
+        """Results as they come; whatever ends this takes what is under way back from the workers."""
+        self._snapper.wait_until_ready()
+        batches, ended = _batches(inputs), SimpleQueue[Ended]()
+        under_way: dict[str, Callable[[], None]] = {}
+
+        def hand_over(most: int) -> None:
+            for batch in islice(batches, most):
+                job, model = self._job(batch), self._data.model(batch[0][0].view.object)
+                on_end = partial(_put, ended, job.snap_id, batch)
+                under_way[job.snap_id] = self._snapper.request(job, model, _ignore, on_end, PRIORITY)
+
+        try:
+            hand_over(JOBS_A_WORKER * max(1, self._snapper.worker_count()))
+            while under_way:
+                snap_id, batch, result = ended.get()
+                del under_way[snap_id]
+                if isinstance(result, SnapError):
+                    raise OfflineError(f"{result} Start the batch again to go on.")
+                hand_over(1)
+                yield batch, result
+        finally:
+            for cancel in under_way.values():
+                cancel()
+
+    def _job(self, inputs: Sequence[Input]) -> SnapBatch:
+        samples = [samples[0] for samples in inputs]
+        view = samples[0].view
+        T_camera_world = pose.inverse(np.array(view.frame.T_world_camera))
+        return SnapBatch(
+            snap_id=uuid.uuid4().hex,
+            topic="",
+            model_hash=self._data.model(view.object).content_hash,
+            depth=self._data.depth(view.frame),
+            camera=camera_of(view.frame),
+            config=self._config,
+            starts=tuple(BatchStart(T_camera_world @ one.T_world_object, one.seed) for one in samples),
+        )
+
+    def _snaps(self, inputs: Sequence[Input], result: BatchResult) -> Iterator[tuple[Sample, Outcome]]:
+        T_world_camera = np.array(inputs[0][0].view.frame.T_world_camera)
+        for samples, outcome in zip(inputs, result.outcomes, strict=True):
+            found = outcome.T_camera_object
+            columns = {
+                "config": self._config.to_dict(),
+                "seed": samples[0].seed,
+                "T_world_object": None if found is None else (T_world_camera @ found).tolist(),
+                "confidence": outcome.confidence,
+                "message": outcome.message,
+                "snap_seconds": outcome.seconds,
+                "evaluations": outcome.evaluations,
+                "version": __version__,
+                "hardware": result.hardware,
+            }
+            for sample in samples:
+                yield sample, columns
+
+
+def _view_of(samples: Input) -> tuple[int, int]:
+    return samples[0].view.key
+
+
+def _batches(inputs: Sequence[Input]) -> Iterator[list[Input]]:
+    for _, of_view in groupby(inputs, key=_view_of):
+        while batch := list(islice(of_view, SNAPS_AT_ONCE)):
+            yield batch
+
+
+def _put(ended: SimpleQueue[Ended], snap_id: str, batch: Sequence[Input], result: Result) -> None:
+    ended.put((snap_id, batch, result))
+
+
+def _ignore(_share: float) -> None:
+    """A job's own progress: its end tells enough."""

@@ -1,0 +1,67 @@
+"""Several snaps of one object in one image as one job: handing each over alone costs workers their time."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.worker import Job, Tell, hardware
+from registration_core import ObjectModel, snap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class BatchStart:
+    """Where one of the snaps starts."""
+
+    T_camera_object: Array
+    """(4, 4)."""
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class BatchOutcome:
+    """What one of the snaps came to."""
+
+    T_camera_object: Array | None
+    """(4, 4); None where it failed."""
+    confidence: float | None
+    seconds: float
+    evaluations: int
+    message: str = ""
+    """Why it failed."""
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """An outcome for each start, and what they were computed on."""
+
+    outcomes: tuple[BatchOutcome, ...]
+    hardware: str
+
+
+@dataclass(frozen=True)
+class SnapBatch(Job[BatchResult]):
+    """Snaps that know nothing of how far off their starts are, nor of other objects; `depth` is all of it."""
+
+    starts: tuple[BatchStart, ...]
+
+    def run(self, model: ObjectModel, tell: Tell) -> BatchResult:
+        """One after the other; one that fails leaves the others as they are."""
+        outcomes = []
+        for number, start in enumerate(self.starts):
+            tell(number / len(self.starts))
+            outcomes.append(self._outcome(model, start))
+        return BatchResult(tuple(outcomes), hardware())
+
+    def _outcome(self, model: ObjectModel, start: BatchStart) -> BatchOutcome:
+        began, rng = time.perf_counter(), np.random.default_rng(start.seed)
+        try:
+            estimate = snap(model, self.depth, self.camera, start.T_camera_object, self.config, rng)
+        except ValueError as error:
+            return BatchOutcome(None, None, time.perf_counter() - began, 0, f"{error}")
+        return BatchOutcome(
+            estimate.T_camera_object, estimate.confidence, estimate.seconds, estimate.evaluations
+        )

@@ -1,0 +1,183 @@
+"""Commands about studies. Heavy imports stay inside the commands."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.terminal import checked_database, console, fail, progress_bar, read_settings
+
+if TYPE_CHECKING:
+    from app.config import Settings
+    from app.database import Database
+    from app.study.studies import Studies
+    from app.study.workplace import Workplace
+    from app.tables import Study
+
+study_cli = typer.Typer(no_args_is_help=True, help="Studies of how people register objects.")
+
+StudyName = Annotated[str, typer.Argument(metavar="STUDY", help="Name of the study.")]
+
+
+@study_cli.command("list")
+def list_studies() -> None:
+    """Print all studies, with how far their participants have come."""
+    from sqlalchemy import select
+
+    from app.tables import Study
+
+    settings = read_settings()
+    database = checked_database(settings)
+    with database.read() as session:
+        rows = session.scalars(select(Study).order_by(Study.id)).all()
+    studies = _studies(settings, database)
+    for row in rows:
+        standings = studies.progress(row.id)
+        done, total = sum(one.done for one in standings), sum(one.total for one in standings)
+        about = f"simulated, {row.state}" if row.is_simulated else row.state
+        console.print(
+            f"{row.name} ({about}): {len(standings)} participants, {done} of {total} tasks submitted",
+            markup=False,
+        )
+
+
+@study_cli.command("simulate")
+def simulate_study(
+    name: Annotated[str, typer.Argument(metavar="STUDY", help="Its name; a study that stopped goes on.")],
+    operators: Annotated[int, typer.Option(min=1, max=500, help="Novices, and as many experts.")] = 8,
+    scenes: Annotated[int, typer.Option(min=1, help="With known poses; of all datasets in turn.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Of the order of tasks, and of the operators.")] = 0,
+) -> None:
+    """Make a study, or go on with it: simulated operators, novices and experts, do all of it by hand."""
+    settings = read_settings()
+    database = checked_database(settings)
+    study = _find(database, name)
+    if study is not None and not study.is_simulated:
+        fail(f"the study {name!r} is one of people; choose another name")
+    with _workplace(settings, database) as workplace:
+        from app.auth import LOCAL_ADMINISTRATOR, Auth, Role
+        from app.study.simulation import create_simulated, plan_of, simulate
+
+        if study is None:
+            plan = plan_of(database, operators, scenes)
+            owner = Auth(database).ensure_user(LOCAL_ADMINISTRATOR, Role.ADMIN)
+            study = create_simulated(workplace, name, plan, seed, owner.id)
+        with _told("simulating") as on_progress:
+            simulate(workplace, study.id, on_progress)
+    console.print(f"Study {name}: all simulated operators are done.", markup=False)
+
+
+@study_cli.command("snap")
+def snap_study(name: StudyName) -> None:
+    """Compute a snap from every pose that the operators of STUDY passed through, as far as it is missing."""
+    settings = read_settings()
+    database = checked_database(settings)
+    study = _existing(database, name)
+    with _workplace(settings, database) as workplace:
+        from app.study.offline import OfflineBatch
+        from app.study.samples import registrations_of
+
+        batch = OfflineBatch(database, workplace.data, workplace.snapper)
+        with _told("snapping") as on_progress:
+            summary = batch.run(registrations_of(database, study.id), on_progress)
+    console.print(
+        f"Study {name}: {summary.samples} sampled poses, {summary.computed} snaps computed,"
+        f" {summary.failed} failed.",
+        markup=False,
+    )
+
+
+@study_cli.command("report")
+def report_study(
+    name: StudyName,
+    out: Annotated[Path, typer.Option(help="Folder to write into.")],
+    snap_seconds: Annotated[float, typer.Option(min=0.0, help="That each snap is charged with.")] = 0.1,
+    without_idle: Annotated[bool, typer.Option("--without-idle", help="Leave idle time out.")] = False,
+    reference: Annotated[
+        bool,
+        typer.Option("--reference", help="Given poses are the truth, not the mean of what was registered."),
+    ] = False,
+) -> None:
+    """Write the report of STUDY: figure, tables, and a page that opens anywhere."""
+    from app.analysis.report import ReportConfig, study_report, write_report
+
+    database = checked_database(read_settings())
+    study = _existing(database, name)
+    config = ReportConfig(snap_seconds, without_idle, truth="reference" if reference else "operators")
+    for path in write_report(study_report(database, study.id, config), out):
+        console.print(str(path), markup=False)
+
+
+@study_cli.command("erase")
+def erase_participant(
+    name: StudyName, code: Annotated[str, typer.Argument(metavar="CODE", help="Of the participant.")]
+) -> None:
+    """Delete all that participant CODE of STUDY did and answered."""
+    from sqlalchemy import select
+
+    from app.tables import Participant
+
+    settings = read_settings()
+    database = checked_database(settings)
+    study = _existing(database, name)
+    with database.read() as session:
+        participant = session.scalar(select(Participant).filter_by(study_id=study.id, code=code))
+    if participant is None:
+        fail(f"the study {name!r} has no participant {code!r}")
+    _studies(settings, database).erase(participant.id)
+    console.print(f"All that {code} did and answered is erased.", markup=False)
+
+
+@contextmanager
+def _workplace(settings: "Settings", database: "Database") -> "Iterator[Workplace]":
+    """Workers, and what they work on; whoever presses Ctrl-C is told that nothing is lost."""
+    from app.snapping import create_snapper
+
+    snapper = create_snapper(settings)
+    try:
+        from app.scene_data import SceneData  # such imports take a while, in which the workers start
+        from app.storage import FileStore
+        from app.study.workplace import Workplace
+
+        yield Workplace(database, SceneData(FileStore(settings.files_dir)), snapper)
+    except KeyboardInterrupt:
+        fail("stopped; what was done is stored, and the same command goes on from there")
+    finally:
+        snapper.close()
+
+
+@contextmanager
+def _told(what: str) -> Iterator[Callable[[int, int], None]]:
+    with progress_bar() as progress:
+        task = progress.add_task(what, total=None)
+
+        def tell(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total, description=f"{what} {done} of {total}")
+
+        yield tell
+
+
+def _studies(settings: "Settings", database: "Database") -> "Studies":
+    from app.scene_data import SceneData
+    from app.storage import FileStore
+    from app.study.studies import Studies
+
+    return Studies(database, SceneData(FileStore(settings.files_dir)))
+
+
+def _find(database: "Database", name: str) -> "Study | None":
+    from sqlalchemy import select
+
+    from app.tables import Study
+
+    with database.read() as session:
+        return session.scalar(select(Study).filter_by(name=name))
+
+
+def _existing(database: "Database", name: str) -> "Study":
+    study = _find(database, name)
+    if study is None:
+        fail(f"there is no study {name!r}; `snap6d study list` names those that are there")
+    return study

@@ -1,0 +1,165 @@
+/** The report of a study. */
+
+import { get } from "../api.js";
+import { byId, element, setText } from "../dom.js";
+import { count } from "../format.js";
+import { ERROR_FIELD, errorsOf, setUpChoices } from "./choices.js";
+import { digits, errorText, intervalText, secondsText, shareText } from "./numbers.js";
+import { curvesSection, drawPanels } from "./panels.js";
+import { remarksSection, section, tableOf } from "./tables.js";
+
+const NAMES = { human: "human", stg: "STG" };
+const TABLES = ["curves", "fitts", "hand_off", "gains", "comparisons", "trials", "samples", "truths", "remarks"];
+
+export async function showStudy(studyId, message) {
+  const url = `/api/reports/${studyId}`;
+  let newest = 0;
+
+  async function show({ error, condition, ...asked }) {
+    const turn = (newest += 1);
+    byId("panels").setAttribute("aria-busy", "true");
+    try {
+      const report = await get(url, asked);
+      if (turn !== newest) return; // another choice was made meanwhile
+      draw(of(report, condition), url, { ...asked, condition }, errorsOf({ error }));
+      message.clear();
+    } catch (problem) {
+      message.problem(problem);
+    }
+    byId("panels").removeAttribute("aria-busy");
+  }
+
+  const { name, choices } = await get(url);
+  document.title = `${name} · Report · Snap6D`;
+  setText(byId("title"), name);
+  setText(byId("crumb"), `Report of ${name}`);
+  const field = (key, label, more = { all: true }) => ({ name: key, label, options: choices[key], ...more });
+  await setUpChoices(
+    [
+      field("group", "Group"),
+      field("mode", "Mode"),
+      field("condition", "Condition", { all: choices.condition.length === 0, chosen: "manual" }),
+      ERROR_FIELD,
+      field("scene", "Scene"),
+      field("object", "Object"),
+      { name: "without_idle", label: "Idle time", options: [["false", "counts"], ["true", "left out"]] },
+      { name: "truth", label: "Truth", options: [["operators", "mean by hand"], ["reference", "reference pose"]] },
+    ],
+    show,
+  );
+}
+
+/** With the curves of one condition; what compares conditions stays. */
+function of(report, condition) {
+  const isShown = (part) => condition === "" || part.condition === condition;
+  return { ...report, cells: report.cells.filter(isShown), gains: report.gains.filter(isShown) };
+}
+
+function draw(report, url, asked, errors) {
+  const which = { errors, isSimulated: report.is_simulated };
+  byId("simulated").hidden = !report.is_simulated;
+  const groups = Object.entries(report.groups).map(([name, n]) => `${name}: ${count(n, "operator")}`);
+  setText(byId("about"), [count(report.trials, "trial"), ...groups].join(" · "));
+  drawPanels(report.cells, NAMES, which);
+  byId("sections").replaceChildren(
+    ...[rotation, handOffs, fitts, comparisons, truths].map((part) => part(report)).filter(Boolean),
+    remarksSection(report.remarks),
+    method(report),
+    downloads(url, asked),
+    curvesSection(report.cells, NAMES, which),
+  );
+}
+
+const cellOf = ({ group, mode, condition, error }) => [group, mode, condition, error];
+
+function rotation({ gains }) {
+  if (gains.length === 0) return null;
+  const answers = gains.filter(({ error }) => error === "rotation");
+  const rows = gains.map((gain) => {
+    const told = (value) => errorText(value, gain.error);
+    const intervals = ["before", "after", "gain"].map((name) => intervalText(gain[name], told));
+    return [...cellOf(gain), gain.moment, ...intervals, shareText(gain.improved), gain.gain.operators, gain.verdict];
+  });
+  const head = ["group", "mode", "condition", "error", "from", "before", "after", "gain", "better", "operators", "verdict"];
+  return section(
+    "Does a snap improve rotation as well?",
+    element("ul", {}, ...answers.map(({ sentence }) => element("li", {}, sentence))),
+    tableOf(head, rows),
+  );
+}
+
+function handOffs({ cells }) {
+  const rows = cells
+    .filter(({ stg }) => stg !== null)
+    .map((cell) => {
+      const point = cell.hand_off;
+      if (point === null) return [...cellOf(cell), "no margin: nothing is saved for sure", "–", "–"];
+      const [low, high] = point.saved_interval;
+      const saved = intervalText({ mean: point.saved, low, high }, secondsText);
+      return [...cellOf(cell), errorText(point.margin, cell.error), errorText(point.best_margin, cell.error), saved];
+    });
+  const head = ["group", "mode", "condition", "error", "let the machine take over from", "saves most at", "seconds saved there"];
+  return rows.length ? section("Hand-off", tableOf(head, rows)) : null;
+}
+
+function fitts({ cells }) {
+  const rows = cells.flatMap((cell) =>
+    ["human", "stg"]
+      .filter((hand) => cell[hand]?.fitts)
+      .map((hand) => {
+        const line = cell[hand].fitts;
+        const told = (name) => intervalText({ mean: line[name], low: line[`${name}_interval`][0], high: line[`${name}_interval`][1] }, secondsText);
+        return [...cellOf(cell), NAMES[hand], errorText(line.distance, cell.error), line.margins, told("a"), told("b"), digits(line.r_squared), digits(line.throughput)];
+      }),
+  );
+  const head = ["group", "mode", "condition", "error", "by", "D", "margins", "a", "b a bit", "R²", "bits/s"];
+  return rows.length ? section("Fitts' law: time = a + b log2(D/W + 1)", tableOf(head, rows)) : null;
+}
+
+function comparisons({ comparisons: pairs }) {
+  const rows = pairs.map((pair) => [
+    pair.mode,
+    `${pair.second} − ${pair.first}`,
+    pair.pairs,
+    pair.seconds.operators,
+    intervalText(pair.seconds, secondsText),
+    intervalText(pair.translation, (value) => errorText(value, "translation")),
+    intervalText(pair.rotation, (value) => errorText(value, "rotation")),
+  ]);
+  const head = ["mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"];
+  return rows.length ? section("Conditions in pairs", tableOf(head, rows)) : null;
+}
+
+function truths({ truths: places }) {
+  const both = (translation, turn) => `${errorText(translation, "translation")}, ${errorText(turn, "rotation")}`;
+  const rows = places.map((place) => [
+    place.name,
+    place.registrations || "given",
+    both(place.translation_spread, place.rotation_spread),
+    place.from_reference === null ? "–" : both(...place.from_reference),
+  ]);
+  return rows.length ? section("Ground truth", tableOf(["object", "registrations", "spread", "off the reference"], rows)) : null;
+}
+
+function method({ config }) {
+  return section(
+    "How the numbers are made",
+    element(
+      "p",
+      {},
+      `Each offline snap is charged with ${config.snap_seconds} s. Idle time ${config.without_idle ? "is left out" : "counts"}. ` +
+        `Intervals hold 95 %, by bootstrap over operators with seed ${config.seed}. Means are over operators who come within a margin.`,
+    ),
+  );
+}
+
+function downloads(url, asked) {
+  const given = Object.entries(asked).filter(([, value]) => value !== "");
+  const link = (name, text) => element("a", { href: `${url}/files/${name}?${new URLSearchParams(given)}`, download: "" }, text);
+  const rows = TABLES.map((name) => [name.replace("_", "-"), link(`${name}.csv`, "CSV"), link(`${name}.parquet`, "Parquet")]);
+  return section(
+    "Download",
+    element("p", { className: "row" }, link("figure.svg", "Figure (SVG)"), link("figure.pdf", "Figure (PDF)"), link("report.html", "Report (HTML)")),
+    tableOf(["table", "CSV", "Parquet"], rows),
+  );
+}

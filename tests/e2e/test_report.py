@@ -1,0 +1,133 @@
+"""The report of a study, put into the database from logs made by hand, read and used in a browser."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.config import Settings
+from app.database import Database
+from tests.app.analysis.hand_made import Entry, at, moved, view
+from tests.app.analysis.hand_made_study import HandMadeStudy, ordinary_work, snapped
+from tests.e2e.conftest import take_picture
+from tests.processes import Server
+
+pytestmark = pytest.mark.e2e
+
+NEARER = (0.07, 0.045, 0.03, 0.02, 0.012, 0.006)
+"""Metres from the world's origin that each move comes to; the turn shrinks along."""
+
+
+def log_of(seconds_a_move: float, end: float) -> list[Entry]:
+    """Moves at even times, then submitted `end` metres off."""
+    poses = [at(x, 8.0 * x) for x in (*NEARER, end)]
+    moves = [moved(1.0 + seconds_a_move * i, "set_pose", T) for i, T in enumerate(poses, start=1)]
+    return [Entry(0.0, "opened"), view(1.0, 0.0), *moves, moved(moves[-1].seconds, "submit", poses[-1])]
+
+
+@pytest.fixture(scope="module")
+def study(server: Server) -> int:
+    """Four novices and four experts, quick and accurate, with snaps from every second sample."""
+    database = Database(Settings(state_dir=server.state_dir).resolved_database_url)
+    rng = np.random.default_rng(4)
+    made = HandMadeStudy(database, "mugs by hand", groups={"novice": 4, "expert": 4, "child": 2})
+    for group, pace in (("novice", 4.0), ("expert", 2.0)):
+        for number in range(4):
+            participant = made.participant(f"{group[0].upper()}{number + 1}", group, is_simulated=number == 3)
+            for mode, hurry in (("accurate", 1.0), ("quick", 0.5)):
+                rate = pace * hurry * rng.uniform(0.8, 1.2)
+                entries = log_of(rate, 0.001 * rng.uniform(-1, 1) if mode == "accurate" else 0.004)
+                registration = made.trial(participant, entries, mode=mode)
+                assert registration is not None
+                samples = [*np.arange(1.0, entries[-1].seconds, 1.0), entries[-1].seconds]
+                snaps = {
+                    float(t): at(0.0015 + 0.03 / t**2, rng.uniform(0.01, 0.02 + 0.4 / t)) for t in samples
+                }
+                made.snaps(registration, snaps)
+    late = [*log_of(1.0, 0.0)[:-1], moved(9.0, "submit", at(0.0), late=99.0)]
+    made.trial(made.participant("L1", "novice"), late)
+    database.close()
+    return made.id
+
+
+@pytest.fixture
+def page(server: Server, study: int, open_page: Callable[[str], Page]) -> Page:
+    """A reviewer looks at it."""
+    page = open_page(
+        server.new_link(f"reviewer of report {np.random.default_rng().integers(1 << 40)}", "reviewer")
+    )
+    page.wait_for_url(f"{server.url}/")
+    page.goto(f"{server.url}/report/{study}")
+    expect(page.locator("h1")).to_have_text("mugs by hand")
+    expect(page.locator(".chart")).to_have_count(4)
+    return page
+
+
+def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
+    expect(page.locator("#simulated")).to_be_visible()
+    expect(page.locator("#about")).to_contain_text("17 trials")
+    expect(page.locator("#sections")).to_contain_text("the clock was put forward by 99 s")
+    expect(page.locator("#sections")).to_contain_text("group child: has no operators")
+    take_picture(page, "report")
+    page.locator("#sections").scroll_into_view_if_needed()
+    page.set_viewport_size({"width": 1920, "height": 1080})
+    page.emulate_media(color_scheme="dark")
+    take_picture(page, "report-dark-large")
+    page.locator("#sections section").first.evaluate("node => node.scrollIntoView()")
+    take_picture(page, "report-sections-dark")
+
+    page.locator("select[name=group]").select_option("expert")
+    page.locator("select[name=error]").select_option("rotation")
+    page.locator("select[name=mode]").select_option("quick")
+    expect(page.locator(".chart")).to_have_count(1)
+    expect(page.locator(".chart h2")).to_have_text("expert, rotation · simulated")
+    assert "group=expert" in page.url and "error=rotation" in page.url
+
+    picture = page.locator(".chart svg")
+    box = picture.bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] * 0.7, box["y"] + box["height"] * 0.3)
+    readout = page.locator(".readout")
+    expect(readout).to_contain_text("n = 4 operators, 4 trials")
+    take_picture(page, "report-hover-dark")
+
+    picture.focus()
+    page.keyboard.press("ArrowLeft")
+    expect(readout).to_contain_text("human, quick: within")
+    page.keyboard.press("ArrowDown")
+    expect(readout).to_contain_text("STG, quick: within")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/replay/*")
+    expect(page.locator("#crumb-object")).to_be_attached()
+
+
+def test_the_numbers_are_there_as_a_table_and_as_files(page: Page) -> None:
+    table = page.locator("section", has_text="The curves as a table")
+    table.get_by_text("Show the table").click()
+    assert table.locator("tbody tr").count() == 8 * 2 * 41
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Figure (PDF)").click()
+    assert download.value.suggested_filename.endswith("figure.pdf")
+
+
+def test_the_team_s_page_tells_of_ordinary_work(page: Page, server: Server) -> None:
+    database = Database(Settings(state_dir=server.state_dir).resolved_database_url)
+    for instance in range(70, 76):
+        asked = [
+            (
+                Entry(4.0 + 3 * i, "snap_requested", snap_id=f"{instance} {i}"),
+                snapped(5.0 + 3 * i, f"{instance} {i}", at(0.01 * i)),
+            )
+            for i in (1, 0)
+        ]
+        moves = [Entry(0.0, "opened"), view(1.0, 0.0), moved(2.0, "set_pose", at(0.06, 0.3))]
+        entries = [*moves, *asked[1], *asked[0], moved(12.0, "submit", at(0.01))]
+        ordinary_work(database, f"operator {instance % 2 + 1} of the team", entries, instance)
+    database.close()
+    page.goto(f"{server.url}/report/team")
+    expect(page.locator("h1")).to_have_text("The team's work")
+    expect(page.locator("#sections")).to_contain_text("Too few snaps for an advice: 6 of at least 10")
+    page.locator("select[name=operator]").select_option("operator 1 of the team")
+    expect(page.locator(".chart")).to_have_count(2)
+    take_picture(page, "report-team")
