@@ -175,8 +175,9 @@ def link_user(name: str) -> None:
 def _role(name: str):  # type: ignore[no-untyped-def] # Role is imported late
     from app.auth import Role
 
-    if name not in set(Role):
-        fail(f"role {name!r} is unknown; choose one of {', '.join(Role)}")
+    given = [role for role in Role if role is not Role.PARTICIPANT]  # which only a study gives
+    if name not in given:
+        fail(f"role {name!r} is unknown; choose one of {', '.join(given)}")
     return Role(name)
 
 

@@ -1,4 +1,7 @@
-/** A task of a study: how far its participant is, a clock where the mode asks for one, and the way on. */
+/**
+ * A task of a study: how far its participant is, a clock where the mode asks for one, and the way on.
+ * What is for ordinary work alone is marked `data-ordinary`, what is for trials alone `data-trial`.
+ */
 
 import { get } from "../api.js";
 import { byId, setText } from "../dom.js";
@@ -13,7 +16,7 @@ export function trialPart(page) {
   function open(task) {
     if (!page.isTrial()) return;
     for (const node of document.querySelectorAll("[data-ordinary]")) node.hidden = true;
-    byId("trial").hidden = false;
+    for (const node of document.querySelectorAll("[data-trial]")) node.hidden = false;
     byId("trial").dataset.mode = task.mode;
     setText(byId("trial-mode"), task.mode === "quick" ? "As quickly as you can" : "As accurately as you can");
     if (task.mode === "quick") clockKey = `snap6d.clock.${page.me().id}.${task.id}`;

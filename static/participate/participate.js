@@ -7,14 +7,18 @@ import { messageArea } from "../message.js";
 const MODES = { accurate: "As accurately as you can", quick: "As quickly as you can" };
 const TOOLS = {
   manual: "The handles of the object alone; there is no machine that helps.",
-  snap: "The handles of the object, and Snap (Space): roughly in place, the machine fits the object to its points.",
-  auto: "The handles of the object, and Snap (Space). After each move the machine looks by itself, too, and takes over where it is confident; you may take that back.",
-  "three points": "The handles, Snap (Space), and Three points (T): click points on the object and the same ones in the scene.",
-  "click-to-place": "The handles, Snap (Space), and Place (P, or a double click): the object goes to where you click.",
+  snap: "The handles, and Snap (Space): roughly in place, the machine fits the object to its points.",
+  auto:
+    "The handles, and Snap (Space). After each move the machine looks by itself, too, and takes over where it is " +
+    "confident; you may take that back.",
+  "three points":
+    "The handles, Snap (Space), and Three points (T): click points on the object and the same ones in the scene.",
+  "click-to-place": "The handles, Snap (Space), and Place (P, or a double click): the object goes where you click.",
   "live snap": "The handles, Snap (Space), and Live (V): a ghost shows where a snap would land; Y takes it.",
   "find it": "The handles, Snap (Space), and Find (F): the machine shows where the object may be; Y takes one.",
 };
-const LINK_NEEDED = "Please open the link that was given to you: it leads to your study, and works as often as you like.";
+const CLOCK = { quick: "A clock runs while the task is open.", accurate: "No clock is shown." };
+const LINK_NEEDED = "Please open the link that was given to you: it leads to your study, as often as you like.";
 
 /** What goes into a screen before it is shown. */
 const FILL = {
@@ -108,7 +112,7 @@ function fillTask() {
   const { object, scene, mode } = place.task;
   setText(byId("task-what"), whatComes());
   setText(byId("task-title"), `${object}, ${scene}`);
-  setText(byId("task-text"), `${MODES[mode]}. ${mode === "quick" ? "A clock is running while the page is open." : "No clock is running."}`);
+  setText(byId("task-text"), `${MODES[mode]}. ${CLOCK[mode]}`);
   byId("task-start").href = taskUrl();
 }
 

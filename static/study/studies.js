@@ -30,7 +30,8 @@ function row({ id, name, state, is_simulated: simulated, plan }) {
   const { conditions, modes, groups, tasks } = plan;
   const each = conditions.length * modes.length * tasks.length;
   const people = Object.entries(groups).map(([group, size]) => `${size} ${group}`);
-  const cells = [simulated ? `${state}, simulated` : state, conditions.join(", "), modes.join(", "), people.join(", "), each];
+  const how = simulated ? `${state}, simulated` : state;
+  const cells = [how, conditions.join(", "), modes.join(", "), people.join(", "), each];
   const link = element("td", {}, element("a", { href: `/studies?study=${id}` }, name));
   return element("tr", {}, link, ...cells.map((text) => element("td", {}, String(text))));
 }

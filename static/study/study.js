@@ -2,25 +2,48 @@
 
 import { del, get, post } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
+import { askFirst } from "./sure.js";
 
 const REFRESH_MS = 10_000;
+const CLOSE = {
+  title: "Close the study?",
+  text: "Nobody can join it or go on with it any more; the data stay. This cannot be taken back.",
+  yes: "Close it",
+};
+const withdrawing = (code) => ({
+  title: `Withdraw ${code}?`,
+  text: "Their data are left out from now on, and their link no longer works. This cannot be taken back.",
+  yes: "Withdraw",
+});
+const erasing = (code) => ({
+  title: `Erase the data of ${code}?`,
+  text: "All that they did and answered is deleted for good, log included; that they were there stays.",
+  yes: "Erase",
+});
 
 export async function showStudy(id, message) {
   const url = `/api/studies/${id}`;
   let study = null;
 
-  byId("close-study").addEventListener("click", close);
+  byId("close-study").addEventListener("click", () => askFirst(CLOSE, () => tried(() => post(`${url}/close`))));
   await refresh();
   byId("study").hidden = false;
   setInterval(() => refresh().catch(message.problem), REFRESH_MS);
 
+  /** Draws only what has changed, so that nobody loses the button under their finger. */
   async function refresh() {
-    draw(await get(url));
+    const received = await get(url);
+    if (JSON.stringify(received) === JSON.stringify(study)) return;
+    study = received;
+    drawStudy();
+    byId("participants").replaceChildren(...study.participants.map(row));
+    byId("no-participants").hidden = study.participants.length > 0;
   }
 
-  function draw(received) {
-    study = received;
-    const { name, state, seed, plan, is_simulated: simulated, participants } = study;
+  function drawStudy() {
+    const { name, state, seed, plan, is_simulated: simulated } = study;
+    const { conditions, modes, tasks, groups } = plan;
+    const isOpen = state === "open";
     document.title = `${name} · Studies · Snap6D`;
     setText(byId("crumb-study"), name);
     byId("crumb-study").hidden = false;
@@ -28,72 +51,54 @@ export async function showStudy(id, message) {
     setText(byId("study-state"), state);
     byId("study-simulated").hidden = !simulated;
     byId("report").href = `/report/${id}`;
-    byId("close-study").hidden = state !== "open";
-    const each = plan.tasks.length * plan.modes.length * plan.conditions.length;
-    setText(byId("study-about"), `${plan.conditions.join(", ")} · ${plan.modes.join(", ")} · ${each} tasks each · seed ${seed}`);
-    byId("invite").replaceChildren(...(state === "open" ? Object.entries(plan.groups).map(inviteButton) : []));
-    byId("participants").replaceChildren(...participants.map(row));
-    byId("no-participants").hidden = participants.length > 0;
+    byId("close-study").hidden = !isOpen;
+    const each = `${tasks.length * modes.length * conditions.length} tasks each`;
+    setText(byId("study-about"), [conditions.join(", "), modes.join(", "), each, `seed ${seed}`].join(" · "));
+    byId("invite").replaceChildren(...(isOpen ? Object.entries(groups).map(inviteButton) : []));
   }
 
   function inviteButton([group, size]) {
     const here = study.participants.filter((one) => one.group === group && !one.withdrawn_at).length;
-    const props = { type: "button", className: "button", disabled: here >= size };
-    const button = element("button", props, icon("add"), `Invite: ${group} (${here} of ${size})`);
-    button.addEventListener("click", () => tried(async () => showLink(await post(`${url}/participants`, { group }), group)));
-    return button;
+    const text = `Invite: ${group} (${here} of ${size})`;
+    return button([icon("add"), text], "button", () => invite(group), here >= size);
   }
+
+  const invite = (group) => tried(async () => showLink(await post(`${url}/participants`, { group }), group));
 
   function row(one) {
     const { code, group, done, total, answers, is_simulated: simulated } = one;
-    const bar = element("progress", { className: "human", max: total || 1, value: done, "aria-label": `Progress of ${code}` });
-    const progress = total ? [bar, `${done} of ${total}`] : ["erased"];
+    const props = { className: "human", max: total || 1, value: done, "aria-label": `Progress of ${code}` };
     const said = Object.entries(answers ?? {}).map(([question, answer]) => `${question} ${answer}`);
-    return element(
-      "tr",
-      {},
-      element("td", {}, element("strong", {}, code)),
-      element("td", {}, simulated ? `${group}, simulated` : group),
-      element("td", {}, ...progress),
-      element("td", {}, stateOf(one)),
-      element("td", {}, said.join(" · ")),
-      element("td", {}, element("div", { className: "actions" }, ...actions(one))),
-    );
+    const cells = [
+      [element("strong", {}, code)],
+      [simulated ? `${group}, simulated` : group],
+      total ? [element("progress", props), `${done} of ${total}`] : ["erased"],
+      [stateOf(one)],
+      [said.join(" · ")],
+      [element("div", { className: "actions" }, ...actions(one))],
+    ];
+    return element("tr", {}, ...cells.map((content) => element("td", {}, ...content)));
   }
 
-  function actions(one) {
-    const path = `${url}/participants/${one.id}`;
-    const renew = ["New link", () => tried(async () => showLink(await post(`${path}/link`), one.group))];
-    const withdraw = ["Withdraw…", () => askFirst(`Withdraw ${one.code}?`, "Their data are left out from now on, and their link no longer works. This cannot be taken back.", "Withdraw", () => post(`${path}/withdraw`))];
-    const erase = ["Erase…", () => askFirst(`Erase the data of ${one.code}?`, "All that they did and answered is deleted for good, log included; that they were there stays.", "Erase", () => del(path))];
-    const open = study.state === "open" && !one.withdrawn_at;
-    const shown = [open && renew, !one.withdrawn_at && withdraw, one.total > 0 && erase].filter(Boolean);
-    return shown.map(([label, run]) => {
-      const button = element("button", { type: "button", className: "button quiet", "aria-label": `${label} ${one.code}` }, label);
-      button.addEventListener("click", run);
-      return button;
-    });
-  }
-
-  function close() {
-    askFirst("Close the study?", "Nobody can join it or go on with it any more; the data stay. This cannot be taken back.", "Close it", () => post(`${url}/close`));
+  function actions({ id: participant, code, group, total, withdrawn_at: withdrawn }) {
+    const path = `${url}/participants/${participant}`;
+    const renew = () => tried(async () => showLink(await post(`${path}/link`), group));
+    const withdraw = () => askFirst(withdrawing(code), () => tried(() => post(`${path}/withdraw`)));
+    const erase = () => askFirst(erasing(code), () => tried(() => del(path)));
+    return [
+      study.state === "open" && !withdrawn && ["New link", renew],
+      !withdrawn && ["Withdraw…", withdraw],
+      total > 0 && ["Erase…", erase],
+    ]
+      .filter(Boolean)
+      .map(([label, run]) => button([label, hiddenText(` ${code}`)], "button quiet", run));
   }
 
   function showLink({ code, link }, group) {
-    const copy = element("button", { type: "button", className: "button" }, "Copy");
-    copy.addEventListener("click", () => copyText(link, copy));
-    byId("link-list").append(element("li", {}, element("strong", {}, code), group, element("code", {}, link), copy));
+    const copy = button(["Copy"], "button", () => copyText(link, copy));
+    const parts = [element("strong", {}, code), group, element("code", {}, link), copy];
+    byId("link-list").append(element("li", {}, ...parts));
     byId("links").hidden = false;
-  }
-
-  function askFirst(title, text, yes, run) {
-    const dialog = byId("sure");
-    setText(byId("sure-title"), title);
-    setText(byId("sure-text"), text);
-    setText(byId("sure-yes"), yes);
-    dialog.returnValue = "no";
-    dialog.onclose = () => dialog.returnValue === "yes" && tried(run);
-    dialog.showModal();
   }
 
   async function tried(run) {
@@ -107,24 +112,29 @@ export async function showStudy(id, message) {
   }
 }
 
+const hiddenText = (text) => element("span", { className: "visually-hidden" }, text);
+
+function button(content, className, run, disabled = false) {
+  const node = element("button", { type: "button", className, disabled }, ...content);
+  node.addEventListener("click", run);
+  return node;
+}
+
 function stateOf({ withdrawn_at: withdrawn, finished_at: finished, consented_at: consented, done }) {
-  const [name, text] = withdrawn
-    ? ["skipped", "withdrawn"]
-    : finished
-      ? ["submitted", "finished"]
-      : consented || done
-        ? ["in_progress", "under way"]
-        : ["open", "invited"];
+  let [name, text] = ["open", "invited"];
+  if (withdrawn) [name, text] = ["skipped", "withdrawn"];
+  else if (finished) [name, text] = ["submitted", "finished"];
+  else if (consented || done) [name, text] = ["in_progress", "under way"];
   return element("span", { className: "state" }, icon(name), text);
 }
 
 /** The clipboard is closed to pages served over plain http: there the link is selected instead. */
-async function copyText(text, button) {
+async function copyText(text, copy) {
   try {
     await navigator.clipboard.writeText(text);
-    setText(button, "Copied");
+    setText(copy, "Copied");
   } catch {
-    getSelection().selectAllChildren(button.previousElementSibling);
-    setText(button, "Selected: copy it");
+    getSelection().selectAllChildren(copy.previousElementSibling);
+    setText(copy, "Selected: copy it");
   }
 }

@@ -49,6 +49,7 @@ class Tags(HTMLParser):
     [
         ("/", "%2F"),
         ("/export", "%2Fexport"),
+        ("/studies?study=3", "%2Fstudies%3Fstudy%3D3"),
         ("/label/7", "%2Flabel%2F7"),
         ("/label/7?frame=2&next=//evil.example", "%2Flabel%2F7%3Fframe%3D2%26next%3D%2F%2Fevil.example"),
     ],
@@ -64,6 +65,8 @@ def test_strangers_are_sent_to_sign_in_and_back(live: LiveServer, path: str, wan
     [
         ("/", "Snap6D"),
         ("/export", "Export"),
+        ("/studies", "Studies"),
+        ("/participate", "Study"),
         ("/label/1", "Label"),
         ("/replay/1", "Replay"),
         ("/sign-in", "Sign in"),
