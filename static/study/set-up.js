@@ -1,29 +1,20 @@
 /** Setting a study up: a form, and beside it the order that it leads to. */
 
-import { getAll, post } from "../api.js";
+import { get, getAll, post } from "../api.js";
 import { byId, element, picture, setText } from "../dom.js";
 import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
 import { showOrders } from "./orders.js";
 
-const MODES = ["accurate", "quick"];
-const CONDITIONS = ["manual", "snap", "auto", "three points", "click-to-place", "live snap", "find it"];
-const FIRST = { modes: MODES, conditions: ["manual"] };
-const INSTRUCTIONS = {
-  accurate: "Place the object as accurately as you can. Take the time you need; submit when you cannot improve it.",
-  quick: "Place the object as quickly as you can. Submit as soon as it looks about right; a clock is running.",
-};
 const PAUSE_MS = 250; // after the last key, before the order is asked for
 
 export async function showSetUp(pageMessage) {
   const message = messageArea(byId("preview-message"));
-  let things = []; // {ref, name, scene, url, use} of the dataset that is shown, `use`: "", "task", "practice"
+  const things = new Map(); // {ref, name, scene, url, use} of all datasets looked at; `use`: "", "task", "practice"
   let waiting = null;
   let newest = 0;
 
-  byId("modes").replaceChildren(...MODES.map((name) => tick("modes", name)));
-  byId("conditions").replaceChildren(...CONDITIONS.map((name) => tick("conditions", name)));
-  for (const mode of MODES) byId(`instructions-${mode}`).value = INSTRUCTIONS[mode];
+  const modes = await fillFromDescription();
   byId("seed").value = crypto.getRandomValues(new Uint32Array(1))[0] % 100000;
   const datasets = await getAll("/api/datasets");
   byId("dataset").replaceChildren(...datasets.map(({ id, name }) => new Option(name, id)));
@@ -35,13 +26,13 @@ export async function showSetUp(pageMessage) {
 
   async function showThings() {
     const tasks = await getAll("/api/tasks", { dataset_id: byId("dataset").value });
-    const seen = new Map(); // of tasks for one thing, in several modes and conditions, one stands for all
-    for (const task of tasks) {
-      const thing = thingOf(task);
-      if (!seen.has(keyOf(thing.ref))) seen.set(keyOf(thing.ref), thing);
+    const keys = new Set(); // of tasks for one thing, in several modes and conditions, one stands for all
+    for (const thing of tasks.map(thingOf)) {
+      const key = keyOf(thing.ref);
+      keys.add(key);
+      if (!things.has(key)) things.set(key, thing);
     }
-    things = [...seen.values()];
-    byId("things").replaceChildren(...things.map(thingRow));
+    byId("things").replaceChildren(...[...keys].map((key) => thingRow(things.get(key))));
     later();
   }
 
@@ -53,13 +44,14 @@ export async function showSetUp(pageMessage) {
       new Option("counts", "task"),
       new Option("for practice", "practice"),
     );
+    choice.value = thing.use;
     choice.addEventListener("change", () => (thing.use = choice.value));
     const text = element("span", {}, thing.name, element("small", {}, thing.scene));
     return element("div", { className: "thing" }, picture(thing.url, "thing-picture", { lazy: true }), text, choice);
   }
 
   function plan() {
-    const used = (use) => things.filter((thing) => thing.use === use).map(({ ref }) => ref);
+    const used = (use) => [...things.values()].filter((thing) => thing.use === use).map(({ ref }) => ref);
     return {
       modes: ticked("modes"),
       conditions: ticked("conditions"),
@@ -67,7 +59,7 @@ export async function showSetUp(pageMessage) {
       tasks: used("task"),
       practice: used("practice"),
       consent: byId("consent").value,
-      instructions: Object.fromEntries(MODES.map((mode) => [mode, byId(`instructions-${mode}`).value])),
+      instructions: Object.fromEntries(modes.map((mode) => [mode, byId(`instructions-${mode}`).value])),
       questions: questionsOf(byId("questions").value),
       break_after: Number(byId("break-after").value),
     };
@@ -95,7 +87,7 @@ export async function showSetUp(pageMessage) {
   }
 
   function nameOf(ref) {
-    const { name, scene } = things.find((thing) => keyOf(thing.ref) === keyOf(ref));
+    const { name, scene } = things.get(keyOf(ref));
     return `${name}, ${scene}`;
   }
 
@@ -113,6 +105,21 @@ export async function showSetUp(pageMessage) {
   }
 }
 
+/** What there is to choose, and what a plan is where nothing is chosen, the server says; returns the modes. */
+async function fillFromDescription() {
+  const { components } = await get("/api/openapi.json");
+  const plan = components.schemas["StudyPlan-Input"].properties;
+  for (const name of ["modes", "conditions"]) {
+    const { items, default: first } = plan[name];
+    byId(name).replaceChildren(...items.enum.map((value) => tick(name, value, first.includes(value))));
+  }
+  const modes = plan.modes.items.enum;
+  for (const mode of modes) byId(`instructions-${mode}`).value = plan.instructions.default[mode];
+  byId("groups").value = Object.entries(plan.groups.default).map((group) => group.join(" ")).join(", ");
+  byId("break-after").value = plan.break_after.default;
+  return modes;
+}
+
 function thingOf(task) {
   const ref = { scene_id: task.scene.id, object_id: task.object.id, instance: task.instance };
   return { ref, name: taskName(task), scene: task.scene.label, url: task.thumbnail_url, use: "" };
@@ -120,8 +127,8 @@ function thingOf(task) {
 
 const keyOf = ({ scene_id: scene, object_id: object, instance }) => `${scene} ${object} ${instance}`;
 
-function tick(group, name) {
-  const box = element("input", { type: "checkbox", name: group, value: name, checked: FIRST[group].includes(name) });
+function tick(group, name, checked) {
+  const box = element("input", { type: "checkbox", name: group, value: name, checked });
   return element("label", {}, box, name);
 }
 
