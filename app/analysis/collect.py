@@ -19,11 +19,11 @@ from app.analysis.runs import Place, Run, about_participants, place_name, runs_o
 from app.analysis.trace import trace_of, until_submission
 from app.analysis.trial import TrialTrace, traced, without_snaps
 from app.database import Database
-from app.tables import OfflineSnap, Participant, Pose, Registration, Study
+from app.tables import OfflineSnap, Participant, Registration, Study
 
 Array = NDArray[np.float64]
 TruthSource = Literal["operators", "reference"]
-SnapsBySecond = dict[float, Pose | None]
+SnapsBySecond = dict[float, Sequence[Sequence[float]] | None]
 """Of a registration, by the second of the trace, rounded; None where the snap failed."""
 
 SECOND_DIGITS = 6
