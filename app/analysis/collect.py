@@ -23,7 +23,7 @@ from app.tables import OfflineSnap, Participant, Pose, Registration, Study
 
 Array = NDArray[np.float64]
 TruthSource = Literal["operators", "reference"]
-SnapsBySecond = dict[float, Pose | None]
+SnapsBySecond = dict[float, Sequence[Sequence[float]] | None]
 """Of a registration, by the second of the trace, rounded; None where the snap failed."""
 
 SECOND_DIGITS = 6
@@ -103,14 +103,14 @@ def _truths(runs: Sequence[Run], source: TruthSource, remarks: list[Remark]) -> 
         if text:
             remarks.append(Remark(name, text))
         if truth is not None:
-            truths[place] = PlaceTruth(name, truth, _from_reference(here[0], truth))
+            truths[place] = PlaceTruth(name, truth, _from_reference(here, truth))
     return truths
 
 
 def _truth(here: Sequence[Run], source: TruthSource) -> tuple[GroundTruth | None, str]:
     """The truth of one place from the runs there, and what there is to say of it."""
     task = here[0].task
-    reference = next((run.task.T_world_object_reference for run in here), None)
+    reference = _reference(here)
     by_hand = [
         run.registration.T_world_object
         for run in here
@@ -129,11 +129,16 @@ def _truth(here: Sequence[Run], source: TruthSource) -> tuple[GroundTruth | None
     )
 
 
-def _from_reference(run: Run, truth: GroundTruth) -> PoseErrors | None:
-    reference = run.task.T_world_object_reference
+def _reference(here: Sequence[Run]) -> Pose | None:
+    """The pose that was given for a place, with any of its tasks."""
+    return next((T for run in here if (T := run.task.T_world_object_reference) is not None), None)
+
+
+def _from_reference(here: Sequence[Run], truth: GroundTruth) -> PoseErrors | None:
+    reference = _reference(here)
     if reference is None or not truth.count:
         return None
-    return pose_errors(truth.T_world_object[None], np.array(reference), symmetries_of(run.task.object))
+    return pose_errors(truth.T_world_object[None], np.array(reference), symmetries_of(here[0].task.object))
 
 
 def _trials(

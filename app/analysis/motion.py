@@ -30,10 +30,13 @@ class Motion:
         after = np.minimum(before + 1, last)
         span = self.seconds[after] - self.seconds[before]
         share = np.clip((times - self.seconds[before]) / np.where(span > 0, span, np.inf), 0.0, 1.0)[:, None]
-        start = Rotation.from_quat(self.rotations[before], scalar_first=True)
-        end = Rotation.from_quat(self.rotations[after], scalar_first=True)
         T = np.tile(np.eye(4), (len(times), 1, 1))
-        T[:, :3, :3] = (start * Rotation.from_rotvec(share * (start.inv() * end).as_rotvec())).as_matrix()
+        T[:, :3, :3] = Rotation.from_quat(self.rotations[before], scalar_first=True).as_matrix()
+        turning = share[:, 0] > 0.0  # between two knots; most of the time a pose rests on one
+        start = Rotation.from_quat(self.rotations[before[turning]], scalar_first=True)
+        end = Rotation.from_quat(self.rotations[after[turning]], scalar_first=True)
+        turn = Rotation.from_rotvec(share[turning] * (start.inv() * end).as_rotvec())
+        T[turning, :3, :3] = (start * turn).as_matrix()
         T[:, :3, 3] = (1.0 - share) * self.positions[before] + share * self.positions[after]
         return T
 

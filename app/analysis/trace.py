@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from app.analysis.motion import Motion, MotionWriter
 from app.auth import Actor
 from app.event_log import STATE_AFTER
-from app.tables import Pose
 
 Array = NDArray[np.float64]
 
@@ -42,7 +41,7 @@ class LoggedEvent(Protocol):
     @property
     def duration_seconds(self) -> float | None: ...
     @property
-    def T_after(self) -> Pose | None: ...
+    def T_after(self) -> Sequence[Sequence[float]] | None: ...
     @property
     def path(self) -> Sequence[Sequence[float]] | None: ...
     @property

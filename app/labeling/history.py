@@ -1,13 +1,11 @@
 """The poses a registration went through, with undo and redo: a pure function of its events."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from app.tables import Pose
 
 NEW_POSE_KINDS = frozenset({"drag", "set_pose", "snap_applied", "accept", "reset"})
 """Events that put a new pose on top, and with it end what could be redone."""
@@ -19,7 +17,7 @@ class LoggedEvent(Protocol):
     @property
     def kind(self) -> str: ...
     @property
-    def T_after(self) -> Pose | None: ...
+    def T_after(self) -> Sequence[Sequence[float]] | None: ...
     @property
     def detail(self) -> dict[str, object]: ...
     @property
