@@ -108,7 +108,7 @@ export async function showSetUp(pageMessage) {
 /** What there is to choose, and what a plan is where nothing is chosen, the server says; returns the modes. */
 async function fillFromDescription() {
   const { components } = await get("/api/openapi.json");
-  const plan = components.schemas["StudyPlan-Input"].properties;
+  const plan = components.schemas.StudyPlan.properties;
   for (const name of ["modes", "conditions"]) {
     const { items, default: first } = plan[name];
     byId(name).replaceChildren(...items.enum.map((value) => tick(name, value, first.includes(value))));
