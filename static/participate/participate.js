@@ -95,6 +95,7 @@ function showScreen(name) {
   FILL[name]?.();
   for (const screen of document.querySelectorAll(".screen")) screen.hidden = screen.id !== name;
   byId("leaving").hidden = name === "withdrawn";
+  byId("leaving-text").hidden = name === "thanks";
   const heading = byId(name).querySelector("h1");
   heading.tabIndex = -1;
   heading.focus();
