@@ -55,7 +55,17 @@ def do_task(page: Page, first_picture: str | None = None) -> str:
         expect(page.locator("#clock-text")).to_have_text(CLOCK)
     else:
         expect(page.locator("#clock")).to_be_hidden()
-    for tool in ("snap", "place", "three-points", "find", "copy", "precision", "skip", "agreement", "confidence"):
+    for tool in (
+        "snap",
+        "place",
+        "three-points",
+        "find",
+        "copy",
+        "precision",
+        "skip",
+        "agreement",
+        "confidence",
+    ):
         expect(page.locator(f"#{tool}")).to_be_hidden()
     scale = frame.evaluate("() => window.__viserMutable.nodeRefFromName['/object'].scale.x")
     wait_for_picture(frame)
