@@ -87,7 +87,7 @@ def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
     picture = page.locator(".chart svg")
     box = picture.bounding_box()
     assert box is not None
-    page.mouse.move(box["x"] + box["width"] * 0.7, box["y"] + box["height"] * 0.3)
+    picture.hover(position={"x": 0.7 * box["width"], "y": 0.3 * box["height"]})
     readout = page.locator(".readout")
     expect(readout).to_contain_text("n = 4 operators, 4 trials")
     take_picture(page, "report-hover-dark")
