@@ -14,6 +14,7 @@ from rich.console import Console
 from app.config import PROJECT
 from benchmarks import (
     ablation,
+    browser,
     commits,
     known,
     live,
@@ -34,6 +35,7 @@ BENCHMARKS = {
     "commits": commits,
     "memory": memory,
     "live": live,
+    "browser": browser,
     "load": load,
     "techniques": techniques,
     "registration": registration,

@@ -24,9 +24,10 @@ PIXEL = """([name, local]) => {
   return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
 }"""
 
-PLACE = "name => window.__viserMutable.nodeRefFromName[name].position.toArray()"
+PLACE = "name => window.__viserMutable.nodeRefFromName[name].matrix.elements.slice(12, 15)"
+"""A drag in the browser moves the matrix alone, what the server says the position as well."""
 OBJECT_AT = """([name, point]) => {
-  const at = window.__viserMutable.nodeRefFromName[name].position.toArray();
+  const at = window.__viserMutable.nodeRefFromName[name].matrix.elements.slice(12, 15);
   return Math.hypot(...at.map((x, i) => x - point[i])) < 0.0005;
 }"""
 
