@@ -4,7 +4,8 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -200,11 +201,12 @@ def test_a_snap_can_be_cancelled(desk: Desk) -> None:
     assert desk.state["snap"]["state"] == "cancelled"
 
 
-def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk) -> None:
+def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk, server: Server) -> None:
     page = desk.page
-    quick = {"preset": "paper", "particle_filter": {"iterations": 1000, "particles": 200}}
-    assert page.request.post(f"{desk.url}/snaps", data={"config": quick}).ok
-    desk.drag("ty", 0.02)
+    with held_up(workers_of(server)):
+        page.keyboard.press("Space")
+        desk.events("snap_requested")
+        desk.drag("ty", 0.02)
     desk.events("snap_offered")
     mine = desk.pose
     expect(page.locator("#offer")).to_be_visible()
@@ -228,6 +230,18 @@ def test_a_dead_worker_is_told_and_the_next_snap_works(desk: Desk, server: Serve
     page.get_by_role("button", name="Try again").click()
     desk.events("snap_applied")
     expect(page.locator("#message")).to_be_hidden()
+
+
+@contextmanager
+def held_up(processes: list[int]) -> Iterator[None]:
+    """Let processes wait until the block ends."""
+    for process in processes:
+        os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for process in processes:
+            os.kill(process, signal.SIGCONT)
 
 
 def workers_of(server: Server) -> list[int]:
