@@ -114,6 +114,7 @@ class LabelingSession:
         self._skip_reason = skip_reason
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
+        self._known_objects = known_objects
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
             registration_id, self._track, condition, same_pose, self._request_from_workers, known_objects
@@ -399,6 +400,7 @@ class LabelingSession:
                 region=region,
                 config=config or SnapConfig(),
                 seed=secrets.randbelow(2**31) if seed is None else seed,
+                known=self._known_objects(),
             )
             self._preview = None
             self._search.start(actor, order)
