@@ -31,6 +31,8 @@ FROM_EDGE = 5
 """Pixels that a person keeps from the edge of what is clicked."""
 POINTING = 0.004
 """Standard deviation of where a click goes, metres on the object."""
+REFUSALS = frozenset({httpx.codes.UNPROCESSABLE_ENTITY, httpx.codes.CONFLICT})
+"""Of what was clicked."""
 
 
 @dataclass(eq=False)
@@ -170,7 +172,7 @@ async def by_live_snap(work: Alignment) -> None:
 async def by_three_points(work: Alignment) -> None:
     """A key and three pairs of clicks, after which the machine snaps; then as with the gizmo.
 
-    Pairs that do not fit together are refused, and clicked again.
+    Pairs that do not fit together, or where no depth was measured, are refused, and clicked again.
     """
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
     points = _far_apart(visible_points(work.task, T_camera_object), 3)
@@ -195,7 +197,7 @@ async def _click_pairs(work: Alignment, T_camera_object: Array, points: Array) -
         try:
             answer = await work.post("three-points", {"pairs": pairs})
         except httpx.HTTPStatusError as refusal:
-            if refusal.response.status_code != httpx.codes.UNPROCESSABLE_ENTITY:
+            if refusal.response.status_code not in REFUSALS:
                 raise
             return False
         await work.stream.until_snap_ended(answer["snap_id"])
