@@ -31,6 +31,8 @@ FROM_EDGE = 5
 """Pixels that a person keeps from the edge of what is clicked."""
 POINTING = 0.004
 """Standard deviation of where a click goes, metres on the object."""
+LEAST_WEIGHT, MOST_FOUND = 0.05, 5
+"""Of the poses that a snap leaves and of those that a search finds, which ones the page shows as pictures."""
 REFUSALS = frozenset({httpx.codes.UNPROCESSABLE_ENTITY, httpx.codes.CONFLICT})
 """Of what was clicked."""
 
@@ -89,14 +91,30 @@ class Alignment:
         return await self._waited(act())
 
     async def snap(self) -> Array:
-        """Press Snap; returns where the object then is."""
+        """Press Snap, and click another pose that the depth fits alike where that one is right.
+
+        Returns:
+            Where the object then is (4, 4).
+        """
 
         async def act() -> dict[str, Any]:
             snap_id = await self.operator.request_snap(self.registration_id)
             return await self.stream.until_snap_ended(snap_id)
 
-        await self.press(act)
+        registration = await self.press(act)
+        if not self.is_aligned(await self.pose()):
+            await self._choose(f"/api/snaps/{registration['snap']['id']}")
         return await self.pose()
+
+    async def _choose(self, snap_url: str) -> None:
+        estimate = (await self.operator.call("GET", snap_url))["estimate"]
+        shown = [one for one in estimate["hypotheses"] if one["weight"] >= LEAST_WEIGHT]
+        T_world_camera = np.array(self.task.frame.T_world_camera)
+        for one in shown:
+            T_world_object = T_world_camera @ np.array(one["T_camera_object"])
+            if self.is_aligned(T_world_object):
+                await self.click(lambda: self.operator.set_pose(self.registration_id, T_world_object))  # noqa: B023 - awaited here
+                return
 
     async def post(self, action: str, body: object = None) -> Any:
         """A REST call on the registration."""
@@ -114,6 +132,11 @@ class Alignment:
         except TimeoutError:
             return False
         return True
+
+    def distance(self, T_world_object: Array) -> float:
+        """From the truth, measured in `CLOSE`; of translation and rotation the worse."""
+        error = self.judge.error(T_world_object, self.task.T_world_object)
+        return float(max(error.translation / CLOSE[0], error.rotation / CLOSE[1]))
 
     def is_near(self, T_world_object: Array) -> bool:
         """Whether a snap from there is worth trying."""
@@ -216,10 +239,10 @@ async def by_finding(work: Alignment) -> None:
 
     T_world_camera = np.array(work.task.frame.T_world_camera)
     found = [T_world_camera @ np.array(one["T_camera_object"]) for one in await work.press(find)]
-    right = [T for T in found if work.judge.error(T, work.task.T_world_object).is_right]
-    for T in right[:1]:
-        await work.click(lambda: work.operator.set_pose(work.registration_id, T))  # noqa: B023 - awaited here
-        if not work.is_aligned(T):
+    best = min(found[:MOST_FOUND], key=work.distance, default=None)
+    if best is not None:
+        await work.click(lambda: work.operator.set_pose(work.registration_id, best))
+        if not work.is_aligned(best):
             await work.snap()
     await by_gizmo_and_snap(work)
 
