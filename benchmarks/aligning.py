@@ -174,13 +174,13 @@ async def by_gizmo(work: Alignment) -> None:
 
 
 async def by_gizmo_and_snap(work: Alignment) -> None:
-    """Drags until a snap may do it, and the snap; where it goes wrong, it is undone, and drags go on."""
-    while work.actions < MOST_ACTIONS and not work.is_aligned(await work.pose()):
-        if work.is_near(await work.pose()) and not work.is_aligned(await work.snap()):
-            await work.press(lambda: work.post("undo"))
-            await work.drag()
-        elif not work.is_aligned(await work.pose()):
-            await work.drag()
+    """Drags until a snap may do it, and the snap, which is undone where it led away; drags do the rest."""
+    while work.actions < MOST_ACTIONS and not work.is_near(await work.pose()):
+        await work.drag()
+    before = await work.pose()
+    if not work.is_aligned(before) and work.distance(await work.snap()) > work.distance(before):
+        await work.press(lambda: work.post("undo"))
+    await by_gizmo(work)
 
 
 async def by_live_snap(work: Alignment) -> None:
@@ -230,7 +230,10 @@ async def _click_pairs(work: Alignment, T_camera_object: Array, points: Array) -
 
 
 async def by_finding(work: Alignment) -> None:
-    """The key that looks for the object, the picture that is right, and a snap; then as with the gizmo."""
+    """The key that looks for the object, and the picture that is right; then drags.
+
+    What a search finds has been polished as a snap polishes: another one would change nothing.
+    """
 
     async def find() -> Any:
         search_id = (await work.post("searches", {}))["id"]
@@ -242,18 +245,16 @@ async def by_finding(work: Alignment) -> None:
     best = min(found[:MOST_FOUND], key=work.distance, default=None)
     if best is not None:
         await work.click(lambda: work.operator.set_pose(work.registration_id, best))
-        if not work.is_aligned(best):
-            await work.snap()
-    await by_gizmo_and_snap(work)
+    await by_gizmo(work)
 
 
 async def by_click_and_snap(work: Alignment) -> None:
-    """A double click on the object in the image, and a snap; then as with the gizmo."""
+    """A double click on the object in the image, and a snap; then drags, or all of it where it is far off."""
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
     pixel = clicked_pixel(work.task, T_camera_object, work.misses(work.task.model.centre))
     await work.click(lambda: work.post("place", pixel))
-    if not work.is_aligned(await work.snap()):
-        await by_gizmo_and_snap(work)
+    rest = by_gizmo if work.is_near(await work.snap()) else by_gizmo_and_snap
+    await rest(work)
 
 
 async def _nothing() -> None:
