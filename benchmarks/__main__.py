@@ -14,6 +14,7 @@ from rich.console import Console
 from app.config import PROJECT
 from benchmarks import (
     ablation,
+    browser,
     commits,
     curves,
     known,
@@ -36,6 +37,7 @@ BENCHMARKS = {
     "commits": commits,
     "memory": memory,
     "live": live,
+    "browser": browser,
     "load": load,
     "techniques": techniques,
     "registration": registration,

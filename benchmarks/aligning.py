@@ -31,6 +31,10 @@ FROM_EDGE = 5
 """Pixels that a person keeps from the edge of what is clicked."""
 POINTING = 0.004
 """Standard deviation of where a click goes, metres on the object."""
+LEAST_WEIGHT, MOST_FOUND = 0.05, 5
+"""Of the poses that a snap leaves and of those that a search finds, which ones the page shows as pictures."""
+REFUSALS = frozenset({httpx.codes.UNPROCESSABLE_ENTITY, httpx.codes.CONFLICT})
+"""Of what was clicked."""
 
 
 @dataclass(eq=False)
@@ -87,14 +91,30 @@ class Alignment:
         return await self._waited(act())
 
     async def snap(self) -> Array:
-        """Press Snap; returns where the object then is."""
+        """Press Snap, and click another pose that the depth fits alike where that one is right.
+
+        Returns:
+            Where the object then is (4, 4).
+        """
 
         async def act() -> dict[str, Any]:
             snap_id = await self.operator.request_snap(self.registration_id)
             return await self.stream.until_snap_ended(snap_id)
 
-        await self.press(act)
+        registration = await self.press(act)
+        if not self.is_aligned(await self.pose()):
+            await self._choose(f"/api/snaps/{registration['snap']['id']}")
         return await self.pose()
+
+    async def _choose(self, snap_url: str) -> None:
+        estimate = (await self.operator.call("GET", snap_url))["estimate"]
+        shown = [one for one in estimate["hypotheses"] if one["weight"] >= LEAST_WEIGHT]
+        T_world_camera = np.array(self.task.frame.T_world_camera)
+        for one in shown:
+            T_world_object = T_world_camera @ np.array(one["T_camera_object"])
+            if self.is_aligned(T_world_object):
+                await self.click(lambda: self.operator.set_pose(self.registration_id, T_world_object))  # noqa: B023 - awaited here
+                return
 
     async def post(self, action: str, body: object = None) -> Any:
         """A REST call on the registration."""
@@ -112,6 +132,11 @@ class Alignment:
         except TimeoutError:
             return False
         return True
+
+    def distance(self, T_world_object: Array) -> float:
+        """From the truth, measured in `CLOSE`; of translation and rotation the worse."""
+        error = self.judge.error(T_world_object, self.task.T_world_object)
+        return float(max(error.translation / CLOSE[0], error.rotation / CLOSE[1]))
 
     def is_near(self, T_world_object: Array) -> bool:
         """Whether a snap from there is worth trying."""
@@ -149,13 +174,13 @@ async def by_gizmo(work: Alignment) -> None:
 
 
 async def by_gizmo_and_snap(work: Alignment) -> None:
-    """Drags until a snap may do it, and the snap; where it goes wrong, it is undone, and drags go on."""
-    while work.actions < MOST_ACTIONS and not work.is_aligned(await work.pose()):
-        if work.is_near(await work.pose()) and not work.is_aligned(await work.snap()):
-            await work.press(lambda: work.post("undo"))
-            await work.drag()
-        elif not work.is_aligned(await work.pose()):
-            await work.drag()
+    """Drags until a snap may do it, and the snap, which is undone where it led away; drags do the rest."""
+    while work.actions < MOST_ACTIONS and not work.is_near(await work.pose()):
+        await work.drag()
+    before = await work.pose()
+    if not work.is_aligned(before) and work.distance(await work.snap()) > work.distance(before):
+        await work.press(lambda: work.post("undo"))
+    await by_gizmo(work)
 
 
 async def by_live_snap(work: Alignment) -> None:
@@ -170,7 +195,7 @@ async def by_live_snap(work: Alignment) -> None:
 async def by_three_points(work: Alignment) -> None:
     """A key and three pairs of clicks, after which the machine snaps; then as with the gizmo.
 
-    Pairs that do not fit together are refused, and clicked again.
+    Pairs that do not fit together, or where no depth was measured, are refused, and clicked again.
     """
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
     points = _far_apart(visible_points(work.task, T_camera_object), 3)
@@ -195,7 +220,7 @@ async def _click_pairs(work: Alignment, T_camera_object: Array, points: Array) -
         try:
             answer = await work.post("three-points", {"pairs": pairs})
         except httpx.HTTPStatusError as refusal:
-            if refusal.response.status_code != httpx.codes.UNPROCESSABLE_ENTITY:
+            if refusal.response.status_code not in REFUSALS:
                 raise
             return False
         await work.stream.until_snap_ended(answer["snap_id"])
@@ -205,7 +230,10 @@ async def _click_pairs(work: Alignment, T_camera_object: Array, points: Array) -
 
 
 async def by_finding(work: Alignment) -> None:
-    """The key that looks for the object, the picture that is right, and a snap; then as with the gizmo."""
+    """The key that looks for the object, and the picture that is right; then drags.
+
+    What a search finds has been polished as a snap polishes: another one would change nothing.
+    """
 
     async def find() -> Any:
         search_id = (await work.post("searches", {}))["id"]
@@ -214,21 +242,19 @@ async def by_finding(work: Alignment) -> None:
 
     T_world_camera = np.array(work.task.frame.T_world_camera)
     found = [T_world_camera @ np.array(one["T_camera_object"]) for one in await work.press(find)]
-    right = [T for T in found if work.judge.error(T, work.task.T_world_object).is_right]
-    for T in right[:1]:
-        await work.click(lambda: work.operator.set_pose(work.registration_id, T))  # noqa: B023 - awaited here
-        if not work.is_aligned(T):
-            await work.snap()
-    await by_gizmo_and_snap(work)
+    best = min(found[:MOST_FOUND], key=work.distance, default=None)
+    if best is not None:
+        await work.click(lambda: work.operator.set_pose(work.registration_id, best))
+    await by_gizmo(work)
 
 
 async def by_click_and_snap(work: Alignment) -> None:
-    """A double click on the object in the image, and a snap; then as with the gizmo."""
+    """A double click on the object in the image, and a snap; then drags, or all of it where it is far off."""
     T_camera_object = pose.inverse(np.array(work.task.frame.T_world_camera)) @ work.task.T_world_object
     pixel = clicked_pixel(work.task, T_camera_object, work.misses(work.task.model.centre))
     await work.click(lambda: work.post("place", pixel))
-    if not work.is_aligned(await work.snap()):
-        await by_gizmo_and_snap(work)
+    rest = by_gizmo if work.is_near(await work.snap()) else by_gizmo_and_snap
+    await rest(work)
 
 
 async def _nothing() -> None:

@@ -23,6 +23,11 @@ class Operator:
     def __init__(self, http: httpx.AsyncClient) -> None:
         self._http = http
 
+    @property
+    def cookies(self) -> list[tuple[str, str]]:
+        """Names and values, the login's among them."""
+        return list(self._http.cookies.items())
+
     async def call(self, method: str, path: str, body: object = None) -> Any:
         """What a REST call answers.
 
@@ -63,7 +68,7 @@ class Operator:
         path = f"/view/{registration_id}/"
         page = await self._http.get(path)
         page.raise_for_status()
-        cookies = "; ".join(f"{name}={value}" for name, value in self._http.cookies.items())
+        cookies = "; ".join(f"{name}={value}" for name, value in self.cookies)
         origin = str(self._http.base_url).rstrip("/")
         async with ViewClient(origin + path, {"cookie": cookies, "origin": origin}) as view:
             await view.wait_until_loaded()

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 from app.api.dependencies import EXAMPLE_POSE, AnyoneDep, SeatDep, ServicesDep, rigid_pose
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
-from app.api.snaps import INTERRUPTED, HypothesisOut, SnapState
+from app.api.snaps import INTERRUPTED, HypothesisOut, KnownObjectOut, SnapState
 from app.auth import Identity
 from app.scene_data import camera_of
 from app.services import Services
@@ -57,6 +57,9 @@ class SearchDetail(BaseModel):
     seed: int
     config: dict[str, Any]
     region: list[int] | None
+    known_objects: list[KnownObjectOut] = Field(
+        description="What was known of the scene: its depth was passed by."
+    )
     seconds: float | None
 
 
@@ -103,6 +106,7 @@ def get_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> Se
         seed=requested.detail["seed"],
         config=requested.detail["config"],
         region=requested.detail["region"],
+        known_objects=requested.detail.get("known_objects", []),
         seconds=outcome.duration_seconds if outcome else None,
     )
 

@@ -235,7 +235,8 @@ class Desk:
             on_progress: Callable[[float], None],
             on_end: Callable[[SearchResult | SnapFailure], None],
         ) -> Callable[[], None]:
-            return self._request_search(frames[order.frame_id], model, order, on_progress, on_end)
+            frame = frames[order.frame_id]
+            return self._request_search(frame, model, neighbours, order, on_progress, on_end)
 
         session = LabelingSession(
             registration_id=registration.id,
@@ -305,6 +306,7 @@ class Desk:
         self,
         frame: Frame,
         model: ObjectModel,
+        neighbours: Neighbours,
         order: SearchOrder,
         on_progress: Callable[[float], None],
         on_end: Callable[[SearchResult | SnapFailure], None],
@@ -315,11 +317,13 @@ class Desk:
             else:
                 on_end(SearchResult(outcome.hypotheses, outcome.seconds, __version__, outcome.hardware))
 
+        depth = self._data.depth(frame)
+        explained = neighbours.explained(frame, order.known)
         job = SearchJob(
             snap_id=order.search_id,
             topic=self._snapper.topic,
             model_hash=model.content_hash,
-            depth=self._data.depth(frame),
+            depth=depth if explained is None else np.where(explained, 0.0, depth),
             camera=camera_of(frame),
             config=order.config,
             seed=order.seed,

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from app.auth import Actor
 from app.event_log import NewEvent
-from app.labeling.snap_exchange import SnapFailure, SnapStatus
+from app.labeling.snap_exchange import KnownObject, SnapFailure, SnapStatus, stored_known
 from app.labeling.track import Track
 from registration_core import Hypothesis, SnapConfig
 
@@ -24,6 +24,8 @@ class SearchOrder:
     """Where to look; everywhere where it is None."""
     config: SnapConfig
     seed: int
+    known: tuple[KnownObject, ...] = ()
+    """Other objects, whose depth is passed by."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Search:
             "config": order.config.to_dict(),
             "region": None if order.region is None else list(order.region),
             "frame_id": order.frame_id,
+            "known_objects": stored_known(order.known),
         }
         self._track.record(NewEvent("search_requested", actor, snap_id=order.search_id, detail=detail))
         self.status = SnapStatus(order.search_id, actor)

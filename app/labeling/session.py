@@ -122,6 +122,7 @@ class LabelingSession:
         self._frame_ids = tuple(frame_ids)
         self._request_snap = request_snap
         self._now = now
+        self._known_objects = known_objects
         self._track = Track(history, frame_id, pivot, record_event)
         self._machine = Machine(
             registration_id,
@@ -418,6 +419,7 @@ class LabelingSession:
                 region=region,
                 config=config or SnapConfig(),
                 seed=secrets.randbelow(2**31) if seed is None else seed,
+                known=self._known_objects(),
             )
             self._preview = None
             self._search.start(actor, order)

@@ -7,6 +7,7 @@ import { sharedDrawing } from "./outline.js";
 import { product } from "./pose.js";
 
 const LEAST_WEIGHT = 0.05; // of a mode that is worth a look
+const MOST_FOUND = 5; // that are worth one
 const SAME = 1e-9; // metres, and entries of a rotation
 
 /** A part of the labelling page. */
@@ -140,7 +141,7 @@ function sourceOf({ state, search, offer, estimate_snap_id: snapId }) {
 }
 
 function posesOf({ kind }, { candidates, frame_id: frameId, estimate }) {
-  if (kind === "proposal") return { frame_id: frameId, poses: candidates };
+  if (kind === "proposal") return { frame_id: frameId, poses: candidates.slice(0, MOST_FOUND) };
   const poses = estimate.hypotheses.filter(({ weight }) => weight >= LEAST_WEIGHT);
   return { frame_id: estimate.frame_id, poses };
 }

@@ -24,6 +24,13 @@ PIXEL = """([name, local]) => {
   return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];
 }"""
 
+PLACE = "name => window.__viserMutable.nodeRefFromName[name].matrix.elements.slice(12, 15)"
+"""A drag in the browser moves the matrix alone, what the server says the position as well."""
+OBJECT_AT = """([name, point]) => {
+  const at = window.__viserMutable.nodeRefFromName[name].matrix.elements.slice(12, 15);
+  return Math.hypot(...at.map((x, i) => x - point[i])) < 0.0005;
+}"""
+
 COUNT_PICTURES = """() => {
   window.picturesLeft = 3;
   const count = () => (window.picturesLeft -= 1) > 0 && requestAnimationFrame(count);
@@ -103,6 +110,16 @@ def wait_for_picture(frame: Frame) -> None:
     frame.wait_for_function("() => window.picturesLeft <= 0")
 
 
+def place_of_object(frame: Frame) -> np.ndarray:
+    """Where the view has the gizmo (3,), in the world."""
+    return np.array(frame.evaluate(PLACE, GIZMO))
+
+
+def wait_for_object(frame: Frame, point: np.ndarray) -> None:
+    """Return when the view has the gizmo at this point (3,) of the world."""
+    frame.wait_for_function(OBJECT_AT, arg=[GIZMO, point.tolist()])
+
+
 def expect_new_view(frame: Frame) -> None:
     """From now on, what the view shows counts only once it was drawn anew, as after a lost connection."""
     frame.evaluate(CALL_OLD, NODES)
@@ -116,14 +133,21 @@ def pixel(page: Page, frame: Frame, local: np.ndarray) -> np.ndarray:
     return np.array([inside[0] + element["x"], inside[1] + element["y"]])
 
 
-def drag(page: Page, frame: Frame, handle: Handle, amount: float, steps: int = 6) -> None:
-    """Drag a handle by `amount` metres or radians with the mouse."""
-    start = pixel(page, frame, handle.grip)
-    end = pixel(page, frame, handle.moved_grip(amount))
+def take_hold(page: Page, frame: Frame, handle: Handle, amount: float) -> tuple[np.ndarray, np.ndarray]:
+    """Press the mouse on a handle.
+
+    Returns:
+        Where it was pressed and where it leads to for `amount` metres or radians, pixels of the page (2,).
+    """
+    start, end = (pixel(page, frame, grip) for grip in (handle.grip, handle.moved_grip(amount)))
     page.mouse.move(*(start - 2))
     page.mouse.move(*start)
     wait_for_picture(frame)
     page.mouse.down()
+    return start, end
+
+
+def pull(page: Page, start: np.ndarray, end: np.ndarray, steps: int = 6) -> None:
+    """Move the mouse, pressed at `start`, to `end`."""
     for step in range(1, steps + 1):
         page.mouse.move(*(start + (end - start) * step / steps))
-    page.mouse.up()

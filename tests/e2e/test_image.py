@@ -15,7 +15,7 @@ from registration_core import Intrinsics, ObjectModel, pose
 from registration_core.rasterizer import render_depth
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, pixel, wait_for_picture
+from tests.e2e.gizmo import wait_for_picture
 from tests.e2e.test_labelling import Desk
 from tests.processes import Server
 
@@ -160,12 +160,7 @@ def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     expected = image.silhouette(np.array(desk.state["T_camera_object"])).nonzero()
     wait_until(lambda: np.linalg.norm(image.place - np.mean(expected, axis=1)[::-1]) < 5, "the start pose")
     before = image.place
-    handle = Handle("tz", desk.scale)
-    start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
-    page.mouse.move(*(start - 2))
-    page.mouse.move(*start)
-    wait_for_picture(desk.frame)
-    page.mouse.down()
+    start, end = desk.take_hold("tz", 0.08)
     for share in (0.3, 0.6, 1.0):
         page.mouse.move(*(start + share * (end - start)))
     wait_until(lambda: np.linalg.norm(image.place - before) > 10, "the outline on its way")

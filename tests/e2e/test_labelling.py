@@ -4,7 +4,8 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,18 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.tables import Condition
+from registration_core import pose
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, drag, expect_new_view, view_frame, wait_for_picture
+from tests.e2e.gizmo import (
+    Handle,
+    expect_new_view,
+    place_of_object,
+    pull,
+    take_hold,
+    view_frame,
+    wait_for_object,
+    wait_for_picture,
+)
 from tests.processes import Server, command_line, descendants, serving
 
 pytestmark = pytest.mark.e2e
@@ -62,6 +73,8 @@ class Desk:
         self.url = f"{server.url}/api/registrations/{started['id']}"
         item = page.request.get(f"{server.url}/api/objects/{self.task['object']['id']}").json()
         self.scale = 0.75 * item["diameter"]
+        self.pivot = pose.apply(pose.inverse(self.pose), place_of_object(self.frame))
+        """Where the gizmo is on the object (3,)."""
 
     @property
     def state(self) -> dict:
@@ -90,11 +103,21 @@ class Desk:
             assert time.monotonic() < deadline
             self.page.wait_for_timeout(50)
 
+    def wait_until_shown(self) -> None:
+        """Return when the 3-D view has the object where it is."""
+        wait_for_object(self.frame, pose.apply(self.pose, self.pivot))
+
+    def take_hold(self, handle: str, amount: float) -> tuple[np.ndarray, np.ndarray]:
+        """Press the mouse on a handle; see `gizmo.take_hold`."""
+        self.wait_until_shown()
+        return take_hold(self.page, self.frame, Handle(handle, self.scale), amount)
+
     def drag(self, handle: str, amount: float) -> dict:
         """Drag a handle with the mouse and return the event that was logged."""
         items = self.page.request.get(f"{self.url}/events?limit=500").json()["items"]
         before = sum(event["kind"] == "drag" for event in items)
-        drag(self.page, self.frame, Handle(handle, self.scale), amount)
+        pull(self.page, *self.take_hold(handle, amount))
+        self.page.mouse.up()
         event = self.events("drag", before + 1)[-1]
         wait_for_picture(self.frame)
         return event
@@ -178,11 +201,12 @@ def test_a_snap_can_be_cancelled(desk: Desk) -> None:
     assert desk.state["snap"]["state"] == "cancelled"
 
 
-def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk) -> None:
+def test_a_result_is_offered_when_the_operator_moved_on(desk: Desk, server: Server) -> None:
     page = desk.page
-    quick = {"preset": "paper", "particle_filter": {"iterations": 1000, "particles": 200}}
-    assert page.request.post(f"{desk.url}/snaps", data={"config": quick}).ok
-    desk.drag("ty", 0.02)
+    with held_up(workers_of(server)):
+        page.keyboard.press("Space")
+        desk.events("snap_requested")
+        desk.drag("ty", 0.02)
     desk.events("snap_offered")
     mine = desk.pose
     expect(page.locator("#offer")).to_be_visible()
@@ -206,6 +230,18 @@ def test_a_dead_worker_is_told_and_the_next_snap_works(desk: Desk, server: Serve
     page.get_by_role("button", name="Try again").click()
     desk.events("snap_applied")
     expect(page.locator("#message")).to_be_hidden()
+
+
+@contextmanager
+def held_up(processes: list[int]) -> Iterator[None]:
+    """Let processes wait until the block ends."""
+    for process in processes:
+        os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for process in processes:
+            os.kill(process, signal.SIGCONT)
 
 
 def workers_of(server: Server) -> list[int]:

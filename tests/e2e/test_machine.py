@@ -10,7 +10,7 @@ from app.labeling.machine import TAKE_OVER_CONFIDENCE
 from app.tables import Condition
 from registration_core import pose
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, pixel, wait_for_picture
+from tests.e2e.gizmo import pull, wait_for_picture
 from tests.e2e.test_labelling import Desk
 from tests.e2e.test_readme import true_pose
 from tests.processes import Server
@@ -62,15 +62,7 @@ def kinds(desk: Desk) -> list[str]:
 
 def hold(desk: Desk, handle: str, amount: float) -> None:
     """Drag a handle with the mouse and keep hold of it."""
-    held = Handle(handle, desk.scale)
-    start = pixel(desk.page, desk.frame, held.grip)
-    end = pixel(desk.page, desk.frame, held.moved_grip(amount))
-    desk.page.mouse.move(*(start - 2))
-    desk.page.mouse.move(*start)
-    wait_for_picture(desk.frame)
-    desk.page.mouse.down()
-    for step in range(1, 7):
-        desk.page.mouse.move(*(start + (end - start) * step / 6))
+    pull(desk.page, *desk.take_hold(handle, amount))
 
 
 def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) -> None:

@@ -248,12 +248,7 @@ def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None
     page.locator("[data-look=sensor]").click()
     desk.wait_for_camera(before)
     assert np.array_equal(desk.pose, T)
-    size = desk.scale
-    start = pixel(page, desk.frame, np.array([0.9 * size, 0, 0]))
-    page.mouse.move(*(start - 2))
-    page.mouse.move(*start)
-    wait_for_picture(desk.frame)
-    page.mouse.down()
+    start, _ = desk.take_hold("tx", 0.0)
     page.mouse.move(*(start + 4))
     page.mouse.move(*(start + 8))
     expect(page.locator("[data-look=top]")).to_be_disabled()
@@ -317,10 +312,7 @@ def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: Prec
     assert np.array(desk.change(lambda: page.mouse.dblclick(*where))["T_after"]) == near(event["T_after"])
     assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
     expect(page.locator("#place-mode")).to_be_hidden()
-    desk.frame.wait_for_function(
-        "x => Math.abs(window.__viserMutable.nodeRefFromName['/object'].position.x - x) < 1e-4",
-        arg=float(pose.apply(desk.pose, MODEL.centre)[0]),
-    )
+    desk.wait_until_shown()
     wait_for_picture(desk.frame)
     assert np.abs(pixel(page, desk.frame, np.zeros(3)) - where).max() < 60
     page.keyboard.press("?")

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from playwright.sync_api import Frame, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import GIZMO, view_frame
+from tests.e2e.gizmo import place_of_object, view_frame, wait_for_object
 from tests.e2e.test_labelling import Desk
 from tests.processes import Server
 
@@ -15,12 +15,6 @@ pytestmark = pytest.mark.e2e
 
 PATIENCE = 60_000
 """Milliseconds."""
-
-PLACE = "name => window.__viserMutable.nodeRefFromName[name].position.toArray()"
-OBJECT_AT = """([name, point]) => {
-  const at = window.__viserMutable.nodeRefFromName[name].position.toArray();
-  return Math.hypot(...at.map((x, i) => x - point[i])) < 0.0005;
-}"""
 
 
 @pytest.fixture
@@ -49,10 +43,6 @@ def go_to(page: Page, share: float) -> float:
     return page.locator("#scrub").evaluate("node => node.valueAsNumber")
 
 
-def wait_for_object(frame: Frame, point: np.ndarray) -> None:
-    frame.wait_for_function(OBJECT_AT, arg=[GIZMO, point.tolist()], timeout=PATIENCE)
-
-
 def test_a_registration_is_played_back_from_its_log(
     desk: Desk, server: Server, open_page: Callable[[str], Page]
 ) -> None:
@@ -60,7 +50,7 @@ def test_a_registration_is_played_back_from_its_log(
     page.locator("#replay").click()
     page.wait_for_url("**/replay/*")
     frame = view_frame(page)
-    start = np.array(frame.evaluate(PLACE, GIZMO))
+    start = place_of_object(frame)
     trace = page.request.get(f"{desk.url}/trace").json()
     (drag,) = desk.events("drag")
     (span,) = (event for event in trace["events"] if event["kind"] == "drag")

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, expect
 from registration_core import pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, pixel, wait_for_picture
+from tests.e2e.gizmo import wait_for_picture
 from tests.e2e.test_image import Image
 from tests.e2e.test_labelling import Desk
 from tests.e2e.test_readme import true_pose
@@ -51,12 +51,7 @@ def image(server: Server, browser: Browser) -> Iterator[Image]:
 
 def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
     desk, page = image.desk, image.page
-    handle = Handle("tz", desk.scale)
-    start, end = (pixel(page, desk.frame, grip) for grip in (handle.grip, handle.moved_grip(0.08)))
-    page.mouse.move(*(start - 2))
-    page.mouse.move(*start)
-    wait_for_picture(desk.frame)
-    page.mouse.down()
+    start, end = desk.take_hold("tz", 0.08)
     wait_until(lambda: desk.state["dragging"], "the drag")
     before, began = page.evaluate("redraws"), time.monotonic()
     moves = redraws = 0

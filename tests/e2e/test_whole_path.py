@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from registration_core import ObjectModel, pose
 from registration_core.pose_error import adi
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, drag, view_frame
+from tests.e2e.gizmo import Handle, pull, take_hold, view_frame, wait_for_object
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -52,13 +52,12 @@ def test_mug_of_frame_0(server: Server, ycbv: Path, open_page: Callable[[str], P
     url = f"{server.url}/api/registrations/{registration['id']}"
     assert page.request.put(f"{url}/pose", data={"T_world_object": start.tolist()}).ok
     expect(page.locator("#undo")).to_be_enabled()
-    frame.wait_for_function(
-        "z => Math.abs(window.__viserMutable.nodeRefFromName['/object'].position.z - z) < 0.3", arg=0.6
-    )
+    model = ObjectModel.load(ycbv / "models/obj_000014.ply", unit="mm")
+    wait_for_object(frame, pose.apply(start, model.centre))
     take_picture(page, "label-mug-start")
 
-    model = ObjectModel.load(ycbv / "models/obj_000014.ply", unit="mm")
-    drag(page, frame, Handle("tx", 0.75 * model.diameter), DRAGGED)
+    pull(page, *take_hold(page, frame, Handle("tx", 0.75 * model.diameter), DRAGGED))
+    page.mouse.up()
     events = wait_for_events(page, url, "drag")
     (drawn,) = [event for event in events if event["kind"] == "drag"]
     assert drawn["dof"] == ["tx"]

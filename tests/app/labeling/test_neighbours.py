@@ -5,12 +5,14 @@ import pytest
 
 from app.auth import Actor, Identity, Role
 from app.labeling.desk import Seat
+from app.scene_data import camera_of
 from app.services import Services
 from app.tables import Task
-from registration_core import pose
+from registration_core import SnapConfig, explained_pixels, pose, propose
 from tests.app.labeling.test_desk import sign_up, wait_for_snap
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.small_dataset import BLOCK, TOOL, true_pose
+from tests.app.waiting import wait_until
 
 
 @pytest.fixture
@@ -99,6 +101,22 @@ def test_a_snap_says_what_it_knew_and_passes_it_by(services, seat, ann):
     ]
     assert requested.detail["known_objects"] == estimate.known_objects == expected
     assert np.allclose(estimate.T_world_object, true_pose(BLOCK), atol=0.05)
+
+
+def test_a_search_passes_by_what_is_known(services, seat, ann):
+    block = submitted(services, 2, ann, true_pose(BLOCK))
+    seat.session.search(Actor.HUMAN, seed=5)
+    wait_until(lambda: not seat.session.snapshot().search.is_live, "the search to end")
+    requested, done = services.log.events(seat.registration.id)[-2:]
+    assert requested.detail["known_objects"][0]["registration_id"] == block.registration.id
+    frame = seat.frames[requested.detail["frame_id"]]
+    depth, camera = services.data.depth(frame), camera_of(frame)
+    T_camera_block = pose.inverse(np.array(frame.T_world_camera)) @ true_pose(BLOCK)
+    explained = explained_pixels(depth, camera, [(block.model, T_camera_block)])
+    assert explained.any()
+    rest = np.where(explained, 0.0, depth)
+    here = propose(seat.model, rest, camera, None, SnapConfig(), np.random.default_rng(5))
+    assert [one["weight"] for one in done.detail["candidates"]] == [one.weight for one in here]
 
 
 def test_the_view_shows_what_is_done_in_its_colour_until_it_is_hidden(services, seat, ann):

@@ -35,6 +35,7 @@ def test_a_search_is_recorded_with_all_that_repeats_it_and_moves_nothing(bench):
         "config": SnapConfig().to_dict(),
         "region": [1, 2, 30, 40],
         "frame_id": FRAMES[0],
+        "known_objects": [],
     }
     assert {event.snap_id for event in bench.log.events} == {search_id}
     assert [one["weight"] for one in done.detail["candidates"]] == [0.75, 0.25]
