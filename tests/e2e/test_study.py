@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import Handle, drag, view_frame, wait_for_picture
+from tests.e2e.gizmo import Handle, pull, take_hold, view_frame
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -75,8 +75,8 @@ def do_task(page: Page, first_picture: str | None = None) -> str:
         "confidence",
     ):
         expect(page.locator(f"#{tool}")).to_be_hidden()
-    wait_for_picture(frame)
-    drag(page, frame, Handle("tx", scale_of_gizmo(page)), 0.01)
+    pull(page, *take_hold(page, frame, Handle("tx", scale_of_gizmo(page)), 0.01))
+    page.mouse.up()
     expect(page.locator("#undo")).to_be_enabled()
     if first_picture:
         take_picture(page, first_picture)
