@@ -1,6 +1,6 @@
 """Studies put into a database by hand, event by event."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from app.database import Database
+from app.study.plan import StudyPlan, TaskRef
 from app.tables import (
     Event,
     Frame,
@@ -30,8 +31,12 @@ START = at(0.1, 1.0)
 class HandMadeStudy:
     """A study on the first scene and object of a database with an imported dataset."""
 
-    def __init__(self, database: Database, name: str = "a study", **plan: Any) -> None:
+    def __init__(
+        self, database: Database, name: str = "a study", groups: Mapping[str, int] | None = None
+    ) -> None:
         self.database = database
+        plan = StudyPlan(tasks=[TaskRef(scene_id=1, object_id=1)]).model_dump(mode="json")
+        plan["groups"] = dict(groups or {})
         with database.write() as session:
             admin = User(name=f"researcher of {name}", role="admin")
             session.add(admin)
