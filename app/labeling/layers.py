@@ -9,5 +9,7 @@ class Layers:
 
     cloud: bool = True
     mesh: bool = True
+    fine: bool = True
+    """All measured points; otherwise a few large ones, which are drawn soon without a graphics card, too."""
     agreement: bool = False
     """The object's surface, coloured by how the depth image agrees with it."""

@@ -40,6 +40,8 @@ STEP_BACK = 1.15
 FIELD_OF_VIEW_LIMITS = (0.5, 1.3)
 """Radians, vertical."""
 BACKGROUND = (24, 27, 33)
+COARSE_POINTS = 20_000
+"""Of a cloud that is not fine: software draws some 700,000 points a second."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,25 @@ class FirstView:
     """From the sensor to what there is to see, metres."""
 
 
+@dataclass(frozen=True)
+class _Measured:
+    """What `SceneView.show_cloud` was given."""
+
+    points: NDArray[np.float32]
+    colors: NDArray[np.uint8]
+    point_size: float
+
+    def coarse(self) -> "_Measured":
+        """At most `COARSE_POINTS` of it, at random, as large as to cover what all of them cover."""
+        count = len(self.points)
+        if count <= COARSE_POINTS:
+            return self
+        chosen = np.random.default_rng(0).choice(count, COARSE_POINTS, replace=False)
+        return _Measured(
+            self.points[chosen], self.colors[chosen], self.point_size * float(np.sqrt(count / COARSE_POINTS))
+        )
+
+
 class SceneView:
     """One viser server on the loopback, for one session; what it shows survives a reload of the page."""
 
@@ -81,6 +102,7 @@ class SceneView:
         self._model = model
         self._ghost: viser.MeshHandle | None = None
         self.uncertainty = UncertaintyView(self._server, MACHINE_COLOR, model.diameter)
+        self._measured: _Measured | None = None
         self._cloud: viser.PointCloudHandle | None = None
         self._on_object: viser.PointCloudHandle | None = None
         self._layers = Layers()
@@ -96,20 +118,15 @@ class SceneView:
 
     def show_cloud(self, points: NDArray[np.float32], colors: NDArray[np.uint8], point_size: float) -> None:
         """Show a point cloud (N, 3) in the world, metres, in place of the one before."""
-        self._cloud = self._server.scene.add_point_cloud(
-            "/cloud",
-            points,
-            colors,
-            point_size=point_size,
-            point_shape="circle",
-            precision="float32",
-            visible=self._layers.cloud,
-        )
+        self._measured = _Measured(points, colors, point_size)
+        self._draw_cloud(self._measured)
 
     def show_layers(self, layers: Layers) -> None:
         """Show or hide cloud and mesh, and what lies on the mesh with it; the gizmo stays."""
-        self._layers = layers
+        before, self._layers = self._layers, layers
         self._mesh.visible = layers.mesh
+        if self._measured is not None and layers.fine != before.fine:
+            self._draw_cloud(self._measured)
         if self._cloud is not None:
             self._cloud.visible = layers.cloud
 
@@ -210,6 +227,18 @@ class SceneView:
         if self._watch is not None:
             self._watch.close()
         self._server.stop()
+
+    def _draw_cloud(self, measured: "_Measured") -> None:
+        drawn = measured if self._layers.fine else measured.coarse()
+        self._cloud = self._server.scene.add_point_cloud(
+            "/cloud",
+            drawn.points,
+            drawn.colors,
+            point_size=drawn.point_size,
+            point_shape="circle",
+            precision="float32",
+            visible=self._layers.cloud,
+        )
 
     def _note_camera(self, camera: viser.CameraHandle) -> None:
         now = _logged(camera)

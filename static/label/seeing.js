@@ -1,16 +1,16 @@
 /** Seeing whether the pose is right: how depth agrees with it, and what the 3-D view shows or puts away. */
 
 import { byId, setText } from "../dom.js";
+import { drawsFinely, rememberLayers, rememberedLayers } from "./fineness.js";
 
-const REMEMBERED = "snap6d.layers";
-const AT_FIRST = { cloud: true, mesh: true, agreement: false };
+const AT_FIRST = { cloud: true, mesh: true, fine: true, agreement: false };
 
 /** A part of the labelling page. */
 export function seeingPart(page) {
   const buttons = [...document.querySelectorAll("[data-layer]")];
   let isChanging = false;
   const wanted = () => {
-    const remembered = { ...AT_FIRST, ...JSON.parse(localStorage.getItem(REMEMBERED)) };
+    const remembered = { ...AT_FIRST, fine: drawsFinely(), ...rememberedLayers() };
     return { ...remembered, agreement: remembered.agreement && page.has("agreement") };
   };
   for (const button of buttons) button.addEventListener("click", () => toggle(button.dataset.layer));
@@ -27,7 +27,7 @@ export function seeingPart(page) {
     if (!page.isConnected() || isChanging) return;
     const { layers } = page.registration();
     const changed = { ...layers, [name]: !layers[name] };
-    localStorage.setItem(REMEMBERED, JSON.stringify(changed));
+    rememberLayers(changed);
     change(changed);
   }
 
@@ -41,6 +41,7 @@ export function seeingPart(page) {
   const bindings = [
     { keys: ["R"], does: "Colour the object by how depth agrees, or not", run: () => toggle("agreement"), tool: "agreement" },
     { keys: ["B"], does: "Hide the cloud, and show it again", run: () => toggle("cloud") },
+    { keys: ["Shift+F"], does: "All measured points, or few, which are drawn sooner", run: () => toggle("fine") },
     { keys: ["M"], does: "Hide the mesh, and show it again", run: () => toggle("mesh") },
   ];
   return { title: "The view", bindings, draw };

@@ -1,6 +1,7 @@
 /** The 3-D view: viser in an iframe of the same origin, with its own panel put away. */
 
 import { byId } from "../dom.js";
+import { finenessQuery } from "./fineness.js";
 
 const HIDE_VISER_PANEL = ".mantine-Paper-root, .mantine-Notifications-root { display: none !important }";
 
@@ -14,7 +15,7 @@ export function openView(viewUrl, onWindow) {
     byId("opening").hidden = true;
     if (document.activeElement === document.body) frame.contentWindow.focus();
   });
-  frame.src = `${viewUrl}?hideViserLogo`;
+  frame.src = `${viewUrl}?hideViserLogo${finenessQuery()}`;
 }
 
 /** viser reconnects only while its own document has the focus. */

@@ -28,6 +28,8 @@ SHOWN_AROUND = """if (location.protocol !== "about:" && !localStorage["snap6d.gu
   for (let id = 1; id < 500; id++) localStorage[`snap6d.guide.${id}`] = '{"isOn": false}';
 }"""
 """Everybody has seen the guide."""
+DRAWN_FINELY = """if (location.protocol !== "about:") localStorage["snap6d.layers"] ??= '{"fine": true}'"""
+"""Somebody wants all measured points, though software has to draw them."""
 LONGEST_MS = 90_000
 """That anything may take on a machine that is busy with others."""
 PICTURES = REPOSITORY / "test-results" / "screenshots"
@@ -80,6 +82,12 @@ def open_page(browser: Browser) -> Iterator[Callable[[str], Page]]:
     for context in contexts:
         context.close()
     assert problems == []
+
+
+def drawing_finely(page: Page) -> Page:
+    """The same page, whose 3-D view will show all that was measured: for pictures."""
+    page.add_init_script(DRAWN_FINELY)
+    return page
 
 
 def take_picture(page: Page, name: str) -> None:

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from registration_core import pose
-from tests.e2e.conftest import take_picture
+from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import wait_for_picture
 from tests.e2e.test_labelling import Desk
 from tests.e2e.test_machine import GHOST_HIDDEN, GHOST_SHOWN
@@ -22,7 +22,7 @@ HIDDEN_HANDLE = (3, 2)
 
 
 def test_find_shows_candidates_and_one_is_taken(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("finder")), server, "box")
+    desk = Desk(drawing_finely(open_page(server.new_link("finder"))), server, "box")
     page = desk.page
     start = desk.pose
     page.keyboard.press("f")

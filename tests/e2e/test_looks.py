@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page
 
-from tests.e2e.conftest import take_picture
+from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.test_labelling import Desk
 from tests.processes import Server
 
@@ -35,7 +35,7 @@ FITS = """() => {
 def test_it_fits_small_and_large_screens_and_names_everything(
     server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    desk = Desk(open_page(server.new_link("looks")), server)
+    desk = Desk(drawing_finely(open_page(server.new_link("looks"))), server)
     page = desk.page
     desk.drag("tx", 0.02)
     page.keyboard.press("Space")

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 from registration_core import pose
 from tests.conftest import REPOSITORY
-from tests.e2e.conftest import take_picture
+from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import view_frame
 from tests.e2e.test_labelling import Desk
 from tests.processes import Server
@@ -40,7 +40,7 @@ def test_first_registration(server: Server, open_page: Callable[[str], Page]) ->
     expect(page.locator("[data-task-id]").first).to_be_visible()
     page.wait_for_load_state("networkidle")
     take_picture(page, "home")
-    desk = Desk(page, server, "mug")
+    desk = Desk(drawing_finely(page), server, "mug")
     assert desk.task["scene"]["label"] == "scene 1"
     take_picture(page, "label-first-sight")
 

@@ -3,16 +3,17 @@ the outline is redrawn in a drag.
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
+from app.labeling.view import COARSE_POINTS
 from registration_core import pose
 from tests.app.waiting import LONGEST, wait_until
-from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import wait_for_picture
+from tests.e2e.conftest import DRAWN_FINELY, take_picture
+from tests.e2e.gizmo import view_frame, wait_for_picture
 from tests.e2e.test_image import Image
 from tests.e2e.test_labelling import Desk
 from tests.e2e.test_readme import true_pose
@@ -30,6 +31,13 @@ COUNT_REDRAWS = """if (window === top) {
 }"""
 DRAG_SECONDS = 4.0
 IS_DRAWN = "name => window.__viserMutable.nodeRefFromName[name]?.visible"
+POINTS_DRAWN = """([least, most]) => {
+  let count = 0;
+  const cloud = window.__viserMutable?.nodeRefFromName["/cloud"];
+  cloud?.traverse(node => node.isPoints && (count = node.geometry.attributes.position.count));
+  return least <= count && count <= most;
+}"""
+SHARPNESS = "window.__viserMutable.canvas.width / window.__viserMutable.canvas.clientWidth"
 IS_HIDDEN = "name => window.__viserMutable.nodeRefFromName[name]?.visible === false"
 NEARER = pose.exp([0.0, 0.0, -0.15, 0.0, 0.0, 0.0])
 FARTHER = pose.exp([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
@@ -40,6 +48,7 @@ def image(server: Server, browser: Browser) -> Iterator[Image]:
     """The page of an operator before the mug of the first demo scene."""
     context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
     context.add_init_script(COUNT_REDRAWS)
+    context.add_init_script(DRAWN_FINELY)
     problems: list[str] = []
     page = context.new_page()
     page.on("pageerror", lambda error: problems.append(str(error)))
@@ -110,6 +119,28 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
     wait_until(lambda: dominant(image) == "", "the outline alone")
 
 
+def test_software_draws_few_points_unless_all_are_asked_for(
+    server: Server, open_page: Callable[[str], Page]
+) -> None:
+    desk = Desk(open_page(server.new_link("without a graphics card")), server, "mug")
+    page = desk.page
+    fine = page.get_by_role("button", name="Fine")
+    expect(fine).to_have_attribute("aria-pressed", "false")
+    desk.frame.wait_for_function(POINTS_DRAWN, arg=[1, COARSE_POINTS])
+    assert desk.frame.evaluate(SHARPNESS) == pytest.approx(0.5, abs=0.01)
+    wait_for_picture(desk.frame)
+    take_picture(page, "label-coarse")
+    page.keyboard.press("Shift+F")
+    desk.frame.wait_for_function(POINTS_DRAWN, arg=[COARSE_POINTS + 1, 300_000])
+    page.reload()
+    frame = view_frame(page)
+    assert frame.evaluate(SHARPNESS) == pytest.approx(1.0, abs=0.01)
+    frame.wait_for_function(POINTS_DRAWN, arg=[COARSE_POINTS + 1, 300_000])
+    expect(fine).to_have_attribute("aria-pressed", "true")
+    fine.click()
+    frame.wait_for_function(POINTS_DRAWN, arg=[1, COARSE_POINTS])
+
+
 def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
     desk, page = image.desk, image.page
     assert page.request.post(f"{desk.url}/reset").ok
@@ -122,7 +153,8 @@ def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
     take_picture(page, "label-layers-hidden")
     assert page.request.put(f"{desk.url}/layers", data={}).ok  # as after the server was restarted
     wait_until(
-        lambda: desk.state["layers"] == {"cloud": False, "mesh": False, "agreement": False}, "what was chosen"
+        lambda: desk.state["layers"] == {"cloud": False, "mesh": False, "fine": True, "agreement": False},
+        "what was chosen",
     )
     page.keyboard.press("m")
     page.keyboard.press("b")

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from app.labeling.placement import point_at_pixel
 from registration_core import Intrinsics, pose
 from registration_core.bop_images import read_depth
-from tests.e2e.conftest import take_picture
+from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import pixel
 from tests.e2e.test_precision import DEMO, MODEL, PreciseDesk, true_pose
 from tests.processes import Server
@@ -35,7 +35,7 @@ TURN = 0.01
 def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> PreciseDesk:
     """A new operator before the bottle of the first scene."""
     name = re.sub(r"\W", "-", request.node.name)[:60]
-    return PreciseDesk(open_page(server.new_link(name)), server, "bottle")
+    return PreciseDesk(drawing_finely(open_page(server.new_link(name))), server, "bottle")
 
 
 class ObjectView:

@@ -46,9 +46,9 @@ def test_every_change_has_a_larger_revision(live: LiveServer, script: httpx.Clie
 
 
 def test_layers_are_chosen(script: httpx.Client, registration: dict[str, Any]) -> None:
-    assert registration["layers"] == {"cloud": True, "mesh": True, "agreement": False}
+    assert registration["layers"] == {"cloud": True, "mesh": True, "fine": True, "agreement": False}
     url = f"{url_of(registration)}/layers"
-    chosen = {"cloud": False, "mesh": True, "agreement": True}
+    chosen = {"cloud": False, "mesh": True, "fine": False, "agreement": True}
     assert script.put(url, json=chosen).json()["layers"] == chosen
     assert "cloud" in sentence(script.put(url, json={"cloud": "maybe"}), 422)
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from app.labeling.camera_watch import CameraWatch
 from app.labeling.layers import Layers
-from app.labeling.view import DragHandlers, FirstView, SceneView
+from app.labeling.view import COARSE_POINTS, DragHandlers, FirstView, SceneView
 from registration_core import ObjectModel, pose
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import CAMERA, ViserClient
@@ -119,6 +119,22 @@ def test_cloud_and_mesh_are_put_away_and_the_gizmo_stays(view):
     with connect(view) as again:
         again.wait_for("SetSceneNodeVisibilityMessage", lambda m: m["name"] == "/cloud" and not m["visible"])
         again.node("TransformControlsMessage", "/object")
+
+
+def test_a_coarse_cloud_has_few_points_that_cover_as_much(view):
+    points = np.random.default_rng(0).uniform(size=(4 * COARSE_POINTS, 3)).astype(np.float32)
+    colors = np.zeros(points.shape, dtype=np.uint8)
+    with connect(view) as client:
+        view.show_layers(Layers(fine=False))
+        view.show_cloud(points, colors, point_size=0.002)
+        coarse = client.node("PointCloudMessage", "/cloud")["props"]
+        shown = coarse["points"].reshape(-1, 3)
+        assert coarse["point_size"] == pytest.approx(0.004)
+        assert len(np.unique(shown, axis=0)) == COARSE_POINTS
+        assert np.isin(shown[:, 0], points[:, 0]).all()
+        assert shown.mean(axis=0) == pytest.approx([0.5, 0.5, 0.5], abs=0.02)
+        view.show_layers(Layers())
+        client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == points.size)
 
 
 def test_points_on_the_object_hang_on_its_mesh_and_are_replaced(view, model):
