@@ -112,7 +112,8 @@ def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])
-    return problem(HTTPStatus.UNPROCESSABLE_ENTITY, f"{place}: {first['msg']}.")
+    said = first["msg"].removeprefix("Value error, ")  # pydantic's own words before ours
+    return problem(HTTPStatus.UNPROCESSABLE_ENTITY, f"{place}: {said}.")
 
 
 def _storage_error(_request: Request, error: Exception) -> JSONResponse:

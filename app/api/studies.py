@@ -5,12 +5,12 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, HTTPException, Request
-from pydantic import BaseModel, Field, StringConstraints
+from pydantic import BaseModel, Field
 from sqlalchemy import select
 
 from app.api.dependencies import AdminDep, AfterDep, Id, LimitDep, Page, ServicesDep, page_of, row_or_404
 from app.services import Services
-from app.study.plan import GroupName, StudyPlan, TaskRef, order_of, rows_of_balance
+from app.study.plan import GroupName, Line, StudyPlan, TaskRef, order_of, rows_of_balance
 from app.study.studies import Standing
 from app.tables import Condition, Mode, Participant, Study
 
@@ -32,7 +32,7 @@ class PlanAndSeed(BaseModel):
 class NewStudy(BaseModel):
     """A study to set up."""
 
-    name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
+    name: Line
     plan: StudyPlan
     seed: Seed | None = Field(None, description="Left out, one is drawn; it is told and kept.")
 

@@ -1,12 +1,21 @@
 """What a study asks of whom, and the order in which each operator does it."""
 
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    model_validator,
+)
 
 from app.tables import Condition, Mode
 
@@ -34,9 +43,32 @@ def _without_repetition(items: list[Item]) -> list[Item]:
     return items
 
 
+def _each_group_once(groups: Any) -> Any:
+    """Before names are stripped: of two that are the same then, only one would be left."""
+    if isinstance(groups, dict):
+        _without_repetition([str(name).strip() for name in groups])
+    return groups
+
+
+def _one_line(text: str) -> str:
+    if any(unicodedata.category(character) == "Cc" for character in text):
+        raise ValueError(f"{text!r} has a line break or a control character; write one line of text")
+    return text
+
+
+def _two_or_none(choices: list[str]) -> list[str]:
+    if len(choices) == 1:
+        raise ValueError(f"{choices[0]} is the only choice; give two or more, or none for a free answer")
+    return choices
+
+
 Text = Annotated[str, StringConstraints(strip_whitespace=True, max_length=5000)]
-Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
-GroupName = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
+Line = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200), AfterValidator(_one_line)
+]
+GroupName = Annotated[
+    str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40), AfterValidator(_one_line)
+]
 RowId = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Once = AfterValidator(_without_repetition)
 
@@ -60,7 +92,9 @@ class Question(_Part):
     """What participants are asked once, before they begin."""
 
     text: Line
-    choices: Annotated[list[Line], Once] = Field([], max_length=20, description="None: a short free answer.")
+    choices: Annotated[list[Line], Once, AfterValidator(_two_or_none)] = Field(
+        [], max_length=20, description="None: a short free answer."
+    )
 
 
 class StudyPlan(_Part):
@@ -68,7 +102,9 @@ class StudyPlan(_Part):
 
     conditions: Annotated[list[Condition], Once] = Field(["manual"], min_length=1)
     modes: Annotated[list[Mode], Once] = Field(["accurate", "quick"], min_length=1)
-    groups: dict[GroupName, Annotated[int, Field(ge=1, le=LARGEST_GROUP)]] = Field(
+    groups: Annotated[
+        dict[GroupName, Annotated[int, Field(ge=1, le=LARGEST_GROUP)]], BeforeValidator(_each_group_once)
+    ] = Field(
         {"novice": 8, "expert": 8}, min_length=1, max_length=20, description="How many operators are in each."
     )
     tasks: Annotated[list[TaskRef], Once] = Field(

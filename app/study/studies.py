@@ -89,7 +89,8 @@ class Studies:
                 raise StudyError(f"the study {study.name!r} has no group {group!r}; its groups are {known}")
             row = _free_row(study.participants, group)
             if row >= plan.groups[group]:
-                raise StudyError(f"the group {group!r} has all its {plan.groups[group]} operators")
+                size = plan.groups[group]
+                raise StudyError(f"the group {group!r} is complete: {size} of {size} operators are invited")
             participant = _new_participant(session, study, group, row, is_simulated or study.is_simulated)
             for place, slot in enumerate(order_of(plan, row, study.seed)):
                 task = find_task(session, slot)
@@ -120,11 +121,15 @@ class Studies:
         """What the participant answers, by the questions' texts.
 
         Raises:
-            StudyError: where a question is not answered, not asked, or has no such choice.
+            StudyError: before they have agreed to take part, and where a question is not answered, not
+                asked, or has no such choice.
         """
         with self._database.write() as session:
             participant = _participant(session, participant_id)
-            questions = {q.text: q for q in StudyPlan.model_validate(participant.study.plan).questions}
+            plan = StudyPlan.model_validate(participant.study.plan)
+            if plan.consent and participant.consented_at is None:
+                raise StudyError("please agree to take part first; nothing is kept of you before")
+            questions = {q.text: q for q in plan.questions}
             for text in questions.keys() | answers.keys():
                 if text not in questions:
                     raise StudyError(f"the study does not ask {text!r}")

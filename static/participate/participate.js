@@ -49,7 +49,8 @@ try {
   await open();
 } catch (error) {
   byId("opening").hidden = true;
-  message.problem(error);
+  setText(byId("no-entry-text"), error.message);
+  showScreen("no-entry");
 }
 
 /** The secret must not stay in the address, from where it would reach the history. */
@@ -94,7 +95,7 @@ function showNext() {
 function showScreen(name) {
   FILL[name]?.();
   for (const screen of document.querySelectorAll(".screen")) screen.hidden = screen.id !== name;
-  byId("leaving").hidden = name === "withdrawn";
+  byId("leaving").hidden = name === "withdrawn" || name === "no-entry";
   byId("leaving-text").hidden = name === "thanks";
   const heading = byId(name).querySelector("h1");
   heading.tabIndex = -1;

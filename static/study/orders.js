@@ -17,7 +17,7 @@ function cell(order, place, nameOf) {
   const slot = order[place];
   const before = order[place - 1];
   const isNew = !before || blockOf(before) !== blockOf(slot);
-  const what = slot.is_practice ? "practice" : `${slot.mode}, ${slot.condition}`;
+  const what = `${slot.is_practice ? "practice, " : ""}${slot.mode}, ${slot.condition}`;
   const block = element("strong", {}, isNew ? what : "");
   return element("td", { className: isNew ? "new-block" : "" }, block, isNew ? element("br") : "", nameOf(slot.task));
 }

@@ -2,7 +2,7 @@
 
 import { get, getAll, post } from "../api.js";
 import { byId, element, picture, setText } from "../dom.js";
-import { taskName } from "../format.js";
+import { count, taskName } from "../format.js";
 import { messageArea } from "../message.js";
 import { showOrders } from "./orders.js";
 
@@ -21,6 +21,8 @@ export async function showSetUp(pageMessage) {
   byId("dataset").addEventListener("change", () => showThings().catch(pageMessage.problem));
   byId("set-up").addEventListener("input", later);
   byId("set-up").addEventListener("submit", create);
+  setText(byId("crumb-study"), "New study");
+  byId("crumb-study").hidden = false;
   byId("set-up").hidden = false;
   if (datasets.length) await showThings();
 
@@ -55,7 +57,7 @@ export async function showSetUp(pageMessage) {
     return {
       modes: ticked("modes"),
       conditions: ticked("conditions"),
-      groups: groupsOf(byId("groups").value),
+      groups: Object.fromEntries(groupsOf(byId("groups").value)),
       tasks: used("task"),
       practice: used("practice"),
       consent: byId("consent").value,
@@ -66,21 +68,23 @@ export async function showSetUp(pageMessage) {
   }
 
   function later() {
+    const mine = ++newest;
+    const isNewest = () => mine === newest;
     clearTimeout(waiting);
     byId("create").disabled = true;
-    waiting = setTimeout(() => preview().catch(message.problem), PAUSE_MS);
+    waiting = setTimeout(() => preview(isNewest).catch((error) => isNewest() && message.problem(error)), PAUSE_MS);
   }
 
-  /** Of several answers the newest question's counts. */
-  async function preview() {
-    const mine = ++newest;
+  /** Of several answers only the one to the form as it is now counts. */
+  async function preview(isNewest) {
     message.clear();
     byId("preview-orders").replaceChildren();
     const wanted = plan();
-    setText(byId("preview-summary"), missing(wanted) ?? "");
-    if (missing(wanted)) return;
+    const lacks = missing(wanted, groupsOf(byId("groups").value));
+    setText(byId("preview-summary"), lacks ?? "");
+    if (lacks) return;
     const answer = await post("/api/studies/preview", { plan: wanted, seed: Number(byId("seed").value) });
-    if (mine !== newest) return;
+    if (!isNewest()) return;
     setText(byId("preview-summary"), summary(wanted, answer));
     byId("preview-orders").replaceChildren(showOrders(answer.orders, nameOf));
     byId("create").disabled = false;
@@ -136,15 +140,13 @@ function ticked(group) {
   return [...document.querySelectorAll(`[name="${group}"]:checked`)].map(({ value }) => value);
 }
 
-/** "novice 8, expert 8" as {novice: 8, expert: 8}. */
+/** "novice 8, expert 8" as [["novice", 8], ["expert", 8]]. */
 function groupsOf(text) {
   const parts = text.split(",").map((part) => part.trim()).filter(Boolean);
-  return Object.fromEntries(
-    parts.map((part) => {
-      const [, name, size] = part.match(/^(.*?)\s*(\d+)$/) ?? [null, part, "0"];
-      return [name, Number(size)];
-    }),
-  );
+  return parts.map((part) => {
+    const [, name, size] = part.match(/^(.*?)\s*(\d+)$/) ?? [null, part, "0"];
+    return [name, Number(size)];
+  });
 }
 
 /** "Handedness: left, right" as {text: "Handedness", choices: ["left", "right"]}, a line each. */
@@ -156,21 +158,28 @@ function questionsOf(text) {
   });
 }
 
-function missing({ modes, conditions, groups, tasks }) {
+/** What the form still lacks, or null. */
+function missing({ modes, conditions, tasks }, groups) {
   if (!tasks.length) return "Choose at least one thing that counts: then the order is shown here.";
   if (!modes.length || !conditions.length) return "Tick at least one mode and one condition.";
-  if (Object.values(groups).some((size) => size < 1) || !Object.keys(groups).length) {
+  if (!groups.length || groups.some(([name, size]) => !name || size < 1)) {
     return "Write each group with its number of operators, such as “novice 8, expert 8”.";
   }
+  const names = groups.map(([name]) => name);
+  const twice = names.find((name, index) => names.indexOf(name) < index);
+  if (twice) return `The group “${twice}” is there twice: write each once.`;
   return null;
 }
 
-function summary({ groups, practice, conditions, tasks, modes }, { rows_of_balance: rows }) {
+function summary({ groups, practice, conditions, tasks, modes }, { rows_of_balance: rows, orders }) {
   const each = tasks.length * modes.length * conditions.length;
   const trying = practice.length * conditions.length;
   const uneven = Object.entries(groups).filter(([, size]) => size % rows).map(([name]) => name);
+  const trials = trying ? `${count(trying, "task")} for practice, then ${each} that count` : count(each, "task");
   const balance = uneven.length
-    ? ` For an even balance groups need a multiple of ${rows} operators; that is not so for ${uneven.join(", ")}.`
-    : " The order is balanced evenly.";
-  return `Each operator practises ${trying} and does ${each} tasks.${balance}`;
+    ? `For an even balance groups need a multiple of ${rows} operators; that is not so for ${uneven.join(", ")}.`
+    : "The order is balanced evenly.";
+  const isCut = Math.max(...Object.values(groups)) > orders.length;
+  const shown = isCut ? ` Shown are the first ${orders.length}; the others follow in the same way.` : "";
+  return `Each operator does ${trials}. Operator 1 is the first one of each group, and so on.${shown} ${balance}`;
 }

@@ -15,6 +15,11 @@ const withdrawing = (code) => ({
   text: "Their data are left out from now on, and their link no longer works. This cannot be taken back.",
   yes: "Withdraw",
 });
+const renewing = (code) => ({
+  title: `A new link for ${code}?`,
+  text: "The one before no longer works, and whoever is signed in by it is signed out. What they did stays.",
+  yes: "New link",
+});
 const erasing = (code) => ({
   title: `Erase the data of ${code}?`,
   text: "All that they did and answered is deleted for good, log included; that they were there stays.",
@@ -68,13 +73,16 @@ export async function showStudy(id, message) {
   function row(one) {
     const { code, group, done, total, answers, is_simulated: simulated } = one;
     const props = { className: "human", max: total || 1, value: done, "aria-label": `Progress of ${code}` };
-    const said = Object.entries(answers ?? {}).map(([question, answer]) => `${question} ${answer}`);
+    const said = Object.entries(answers ?? {}).flatMap(([question, answer]) => [
+      element("dt", {}, question),
+      element("dd", {}, answer),
+    ]);
     const cells = [
       [element("strong", {}, code)],
       [simulated ? `${group}, simulated` : group],
       total ? [element("progress", props), `${done} of ${total}`] : ["erased"],
       [stateOf(one)],
-      [said.join(" · ")],
+      said.length ? [element("dl", { className: "answers" }, ...said)] : [],
       [element("div", { className: "actions" }, ...actions(one))],
     ];
     return element("tr", {}, ...cells.map((content) => element("td", {}, ...content)));
@@ -82,11 +90,12 @@ export async function showStudy(id, message) {
 
   function actions({ id: participant, code, group, total, withdrawn_at: withdrawn }) {
     const path = `${url}/participants/${participant}`;
-    const renew = () => tried(async () => showLink(await post(`${path}/link`), group));
+    const newLink = async () => showLink(await post(`${path}/link`), group);
+    const renew = () => askFirst(renewing(code), () => tried(newLink));
     const withdraw = () => askFirst(withdrawing(code), () => tried(() => post(`${path}/withdraw`)));
     const erase = () => askFirst(erasing(code), () => tried(() => del(path)));
     return [
-      study.state === "open" && !withdrawn && ["New link", renew],
+      study.state === "open" && !withdrawn && ["New link…", renew],
       !withdrawn && ["Withdraw…", withdraw],
       total > 0 && ["Erase…", erase],
     ]

@@ -49,6 +49,7 @@ def test_a_seed_is_drawn_and_told_where_none_is_given(chief):
     [
         ({"tasks": []}, 422, "body.plan.tasks"),
         ({"groups": {"novice": 0}}, 422, "body.plan.groups.novice"),
+        ({"groups": {"novice": 1, " novice": 3}}, 422, "body.plan.groups: novice is there twice"),
         ({"tasks": [{"scene_id": 999, "object_id": 1}]}, 409, "there is no scene 999"),
         ({"tasks": [{"scene_id": 1, "object_id": 999}]}, 409, "object 999 is none of the dataset"),
     ],
@@ -77,7 +78,7 @@ def test_a_complete_group_takes_nobody_more(chief):
     study = new_study(chief)
     invite(chief, study)
     answer = chief.post(f"/api/studies/{study['id']}/participants", json={"group": "novice"})
-    assert "has all its 1 operators" in sentence(answer, 409)
+    assert "'novice' is complete: 1 of 1 operators" in sentence(answer, 409)
 
 
 def test_closing_ends_it_for_everybody(server, chief):

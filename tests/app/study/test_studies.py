@@ -78,7 +78,7 @@ def test_a_participant_has_the_tasks_of_their_row_in_order(database, studies, st
 
 def test_who_withdraws_leaves_their_row_to_the_next(studies, study):
     first = studies.add_participant(study.id, "novice").participant
-    with pytest.raises(StudyError, match="has all its 1 operators"):
+    with pytest.raises(StudyError, match="is complete: 1 of 1 operators"):
         studies.add_participant(study.id, "novice")
     studies.withdraw(first.id)
     second = studies.add_participant(study.id, "novice").participant
@@ -141,6 +141,18 @@ def test_answers_are_those_that_are_asked_for(studies, study):
             studies.answer(participant.id, answers)
     studies.answer(participant.id, {question: " yes "})
     assert studies.progress(study.id)[0].participant.answers == {question: "yes"}
+
+
+def test_nobody_is_asked_before_they_agreed(studies, plan, admin):
+    agreed = studies.create("agreed", plan.model_copy(update={"consent": "You move objects."}), 7, admin.id)
+    participant = studies.add_participant(agreed.id, "novice").participant
+    answers = {plan.questions[0].text: "yes"}
+    with pytest.raises(StudyError, match="agree to take part first"):
+        studies.answer(participant.id, answers)
+    assert studies.progress(agreed.id)[0].participant.answers is None
+    studies.consent(participant.id)
+    studies.answer(participant.id, answers)
+    assert studies.progress(agreed.id)[0].participant.answers == answers
 
 
 def test_what_is_not_there_is_named(studies, study, plan, admin):
