@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 study_cli = typer.Typer(no_args_is_help=True, help="Studies of how people register objects.")
 
+Part = Annotated[str | None, typer.Option(help="Only trials of this one.")]
 StudyName = Annotated[str, typer.Argument(metavar="STUDY", help="Name of the study.")]
 
 
@@ -60,7 +61,12 @@ def simulate_study(
         from app.auth import LOCAL_ADMINISTRATOR, Auth, Role
         from app.study.simulation import create_simulated, plan_of, simulate
 
-        if study is None:
+        if study is not None:
+            console.print(
+                f"Study {name} goes on as it was set up, whatever --operators, --scenes and --seed say.",
+                markup=False,
+            )
+        else:
             plan = plan_of(database, operators, scenes)
             owner = Auth(database).ensure_user(LOCAL_ADMINISTRATOR, Role.ADMIN)
             study = create_simulated(workplace, name, plan, seed, owner.id)
@@ -78,13 +84,17 @@ def snap_study(name: StudyName) -> None:
     with _workplace(settings, database) as workplace:
         from app.study.offline import OfflineBatch
         from app.study.samples import registrations_of
+        from app.study.snap_store import SnapStore
 
+        registrations = registrations_of(database, study.id)
         batch = OfflineBatch(database, workplace.data, workplace.snapper)
         with _told("snapping") as on_progress:
-            summary = batch.run(registrations_of(database, study.id), on_progress)
+            summary = batch.run(registrations, on_progress)
+        seconds = SnapStore(database).median_seconds(registrations)
+    took = f" A snap took {seconds:.2g} s (median)." if summary.samples else ""
     console.print(
         f"Study {name}: {summary.samples} sampled poses, {summary.computed} snaps computed,"
-        f" {summary.failed} failed.",
+        f" {summary.failed} failed.{took}",
         markup=False,
     )
 
@@ -92,7 +102,12 @@ def snap_study(name: StudyName) -> None:
 @study_cli.command("report")
 def report_study(
     name: StudyName,
-    out: Annotated[Path, typer.Option(help="Folder to write into.")],
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder to write into.")],
+    group: Part = None,
+    mode: Part = None,
+    condition: Part = None,
+    scene: Part = None,
+    object: Part = None,
     snap_seconds: Annotated[float, typer.Option(min=0.0, help="That each snap is charged with.")] = 0.1,
     without_idle: Annotated[bool, typer.Option("--without-idle", help="Leave idle time out.")] = False,
     reference: Annotated[
@@ -100,13 +115,22 @@ def report_study(
         typer.Option("--reference", help="Given poses are the truth, not the mean of what was registered."),
     ] = False,
 ) -> None:
-    """Write the report of STUDY: figure, tables, and a page that opens anywhere."""
+    """Write the report of STUDY, or of a part of it: figure, tables, and a page that opens anywhere."""
     from app.analysis.report import ReportConfig, study_report, write_report
+    from app.analysis.selection import Selection
 
     database = checked_database(read_settings())
     study = _existing(database, name)
     config = ReportConfig(snap_seconds, without_idle, truth="reference" if reference else "operators")
-    for path in write_report(study_report(database, study.id, config), out):
+    part = Selection(group, mode, condition, scene, object)
+    with progress_bar() as progress:
+        progress.add_task("reading the log", total=None)
+        report = study_report(database, study.id, config, part)
+    try:
+        paths = write_report(report, out)
+    except OSError as error:
+        fail(f"cannot write into {out}: {error.strerror}; choose another folder with --out")
+    for path in paths:
         console.print(str(path), markup=False)
 
 

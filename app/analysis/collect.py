@@ -7,27 +7,22 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from sqlalchemy import Text, cast, select
-from sqlalchemy.orm import Session
+from sqlalchemy import select
 
 from app.analysis.ground_truth import GroundTruth, given_truth, mean_truth
 from app.analysis.log_faults import faults_of
-from app.analysis.logs import LoggedRow, decoded_pose, read_logs
+from app.analysis.logs import LoggedRow, read_logs
+from app.analysis.offline_snaps import SnapsBySecond, about_snaps, snaps_at, snaps_of
 from app.analysis.pose_errors import PoseErrors, pose_errors
 from app.analysis.remarks import Remark, counted
 from app.analysis.runs import Place, Run, about_participants, place_name, runs_of, symmetries_of
 from app.analysis.trace import trace_of, until_submission
 from app.analysis.trial import TrialTrace, traced, without_snaps
 from app.database import Database
-from app.tables import OfflineSnap, Participant, Pose, Registration, Study
+from app.tables import Participant, Pose, Study
 
 Array = NDArray[np.float64]
 TruthSource = Literal["operators", "reference"]
-SnapsBySecond = dict[float, Sequence[Sequence[float]] | None]
-"""Of a registration, by the second of the trace, rounded; None where the snap failed."""
-
-SECOND_DIGITS = 6
-"""Decimals to which the time of a sample and that of its snap agree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +69,11 @@ def trials_of(database: Database, study_id: int, source: TruthSource = "operator
             select(Participant).where(Participant.study_id == study_id).order_by(Participant.id)
         ).all()
         runs, remarks = runs_of(session, study_id)
-        snaps = _snaps(session, study_id)
-    remarks = [*about_participants(study, participants), *remarks, *_about_snaps(snaps)]
+        snaps = snaps_of(session, study_id)
+    remarks = [*about_participants(study, participants), *remarks]
     truths = _truths(runs, source, remarks)
     trials = _trials(database, runs, truths, snaps, remarks)
+    remarks += about_snaps(trials, snaps)
     present = [participant.group for participant in participants if participant.withdrawn_at is None]
     return Collected(
         study_id=study_id,
@@ -175,40 +171,10 @@ def _trial(
     trace = trace_of(run.task.T_world_object_start, until_submission(rows))
     times = trace.sample_times()
     errors = pose_errors(trace.motion.at(times), T_truth, symmetries)
+    found = snaps_at(times, snaps)
     stg_errors = without_snaps(len(times))
-    found = [(i, T) for i, second in enumerate(times.tolist()) if (T := snaps.get(_key(second))) is not None]
-    if found:
-        places = [i for i, _ in found]
-        stg = pose_errors(np.array([T for _, T in found]), T_truth, symmetries)
-        stg_errors.translation[places] = stg.translation
-        stg_errors.rotation[places] = stg.rotation
-    return traced(run.info, trace, times, errors, stg_errors)
-
-
-def _snaps(session: Session, study_id: int) -> dict[int, SnapsBySecond]:
-    """The offline snaps of a study by registration; of several from one pose the newest counts."""
-    query = (
-        select(OfflineSnap.registration_id, OfflineSnap.seconds, cast(OfflineSnap.T_world_object, Text))
-        .join(Registration, OfflineSnap.registration_id == Registration.id)
-        .join(Participant, Participant.user_id == Registration.user_id)
-        .where(Participant.study_id == study_id)
-        .order_by(OfflineSnap.id)
-    )
-    snaps: dict[int, SnapsBySecond] = defaultdict(dict)
-    for registration_id, seconds, text in session.execute(query):
-        snaps[registration_id][_key(seconds)] = decoded_pose(text)
-    return snaps
-
-
-def _about_snaps(snaps: Mapping[int, SnapsBySecond]) -> list[Remark]:
-    results = [T for of_registration in snaps.values() for T in of_registration.values()]
-    failed = sum(T is None for T in results)
-    if not results:
-        return [Remark("offline snaps", "none were computed; there are no STG curves")]
-    return [Remark("offline snaps", f"{failed} of {len(results)} failed; they come within no margin")] * bool(
-        failed
-    )
-
-
-def _key(seconds: float) -> float:
-    return round(seconds, SECOND_DIGITS)
+    if found.places:
+        stg = pose_errors(found.T_world_object, T_truth, symmetries)
+        stg_errors.translation[found.places] = stg.translation
+        stg_errors.rotation[found.places] = stg.rotation
+    return traced(run.info, trace, times, errors, stg_errors, found.missing)

@@ -1,8 +1,8 @@
 """The figure of a report, in the layout of the paper's Figure 2; the same bytes for the same numbers.
 
 Error margin from large to small, seconds on the left axis, share of trials that come within it on the right
-one; a column a group, a row an error. Red and solid is the human, blue and dashed is STG; accurate is thick,
-quick is thin and dotted with marks.
+one, as a faint shade with a dotted edge; a column a group, a row an error with one scale of seconds. Red and
+solid is the human, blue and dashed is STG; accurate is thick, quick is thin with marks.
 """
 
 import io
@@ -42,22 +42,25 @@ TICKS: dict[ErrorKind, Sequence[float]] = {
     "rotation": (90, 45, 20, 10, 5, 2, 1),
 }
 """Millimetres and degrees."""
+SHARES, MOST_SHARE = (0.0, 0.25, 0.5, 0.75, 1.0), 1.04
+"""Ticks on the right, and the end of that axis: a share of 1 is not hidden by the frame."""
 _lock = threading.Lock()
 """matplotlib's settings are everybody's."""
 
 
-def figure_bytes(report: Report, file_format: FigureFormat) -> bytes:
-    """The figure of a report as a file."""
+def figure_bytes(report: Report, file_format: FigureFormat, condition: str | None = None) -> bytes:
+    """The figure of a report as a file: of a condition, or of `manual`; where there is none, of the first."""
     sink = io.BytesIO()
     dates = {"Date": None} if file_format == "svg" else {"CreationDate": None, "ModDate": None}
     with _lock, mpl.rc_context(SETTINGS):
-        draw(report).savefig(sink, format=file_format, metadata=dates)
+        draw(report, condition or shown_conditions(report)[0]).savefig(
+            sink, format=file_format, metadata=dates
+        )
     return sink.getvalue()
 
 
-def draw(report: Report) -> Figure:
-    """Panels of one condition: of `manual`, or where there is none, of the first."""
-    condition = shown_condition(report)
+def draw(report: Report, condition: str) -> Figure:
+    """Panels of one condition."""
     cells = [cell for cell in report.cells if cell.condition == condition]
     groups = list(report.collected.groups) or [""]
     figure = Figure((PANEL[0] * len(groups), PANEL[1] * len(ERROR_KINDS) + 0.9), layout="constrained")
@@ -67,6 +70,9 @@ def draw(report: Report) -> Figure:
         for panel, group in zip(row, groups, strict=True):
             here = [cell for cell in cells if cell.group == group and cell.error == kind]
             _draw_panel(panel, here, kind, f"{group}, {kind}")
+        top = max(panel.get_ylim()[1] for panel in row)
+        for panel in row:
+            panel.set_ylim(0.0, top)
     figure.suptitle(_title(report, condition))
     figure.legend(handles=list(_legend(cells)), loc="outside lower center", ncols=4, frameon=False)
     if report.collected.is_simulated:
@@ -84,10 +90,10 @@ def draw(report: Report) -> Figure:
     return figure
 
 
-def shown_condition(report: Report) -> str:
-    """The condition that the figure shows."""
-    conditions = [cell.condition for cell in report.cells]
-    return "manual" if "manual" in conditions or not conditions else conditions[0]
+def shown_conditions(report: Report) -> list[str]:
+    """The conditions that there are figures of, the baseline first; at least one, were it without curves."""
+    conditions = dict.fromkeys(cell.condition for cell in report.cells)
+    return sorted(conditions, key=lambda name: name != "manual") or ["manual"]
 
 
 def _title(report: Report, condition: str) -> str:
@@ -109,12 +115,12 @@ def _draw_panel(panel: Axes, cells: Sequence[Cell], kind: ErrorKind, title: str)
     panel.set_xticks(TICKS[kind])
     panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
-    panel.set_ylim(bottom=0.0)
-    shares.set_ylim(0.0, 1.0)
+    shares.set_ylim(0.0, MOST_SHARE)
+    shares.set_yticks(SHARES)
     shares.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:.0f} %"))
     panel.set_xlabel(f"error margin [{UNITS[kind]}]")
     panel.set_ylabel("seconds to come within it")
-    shares.set_ylabel("remaining", color="#666666")
+    shares.set_ylabel("share remaining", color="#666666")
     if not cells:
         panel.text(0.5, 0.5, "no operators", transform=panel.transAxes, ha="center", color="#666666")
 
@@ -123,8 +129,9 @@ def _draw_curve(panel: Axes, shares: Axes, drawn: Drawn, cell: Cell, color: str,
     curve = drawn.curve
     x = np.array([in_people_units(margin, cell.error) for margin in curve.margins.tolist()])
     is_quick = cell.mode == "quick"
-    shares.fill_between(x, curve.share, color=color, alpha=0.07, linewidth=0)
-    panel.fill_between(x, curve.low, curve.high, color=color, alpha=0.16, linewidth=0)
+    shares.fill_between(x, curve.share, color=color, alpha=0.035, linewidth=0)
+    shares.plot(x, curve.share, color=color, alpha=0.75, linestyle=":", linewidth=0.9 if is_quick else 1.6)
+    panel.fill_between(x, curve.low, curve.high, color=color, alpha=0.2, linewidth=0)
     panel.plot(
         x,
         curve.mean,
@@ -155,4 +162,4 @@ def _legend(cells: Sequence[Cell]) -> Iterator[Line2D | Patch]:
                 label=f"{hand}, {mode}",
             )
     yield Patch(color="#777777", alpha=0.3, label="95 % interval over operators")
-    yield Patch(color="#777777", alpha=0.1, label="share that comes within the margin")
+    yield Line2D([], [], color="#777777", linestyle=":", linewidth=1.6, label="share remaining (right axis)")

@@ -35,6 +35,12 @@ class Fitts:
     throughput: float
     """1 / b, bits a second; NaN where b is not positive."""
 
+    @property
+    def throughput_interval(self) -> tuple[float, float]:
+        """Of the interval of b; NaN where b may be 0 or less."""
+        low, high = self.b_interval
+        return (1.0 / high, 1.0 / low) if low > 0 else (np.nan, np.nan)
+
 
 def fitts(curve: Curve, distance: float, seed: int) -> Fitts | None:
     """Fit the curve's means where W < D and at least half of the operators come within W, so that the line

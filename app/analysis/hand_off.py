@@ -17,8 +17,10 @@ class HandOff:
 
     margin: float
     """Metres or radians."""
+    is_largest: bool
+    """Whether it is the largest of all margins: the curves may part farther out."""
     best_margin: float
-    """Where it saves most."""
+    """Where it saves most for sure."""
     saved: float
     """Seconds there, mean over the operators who come within it both ways."""
     saved_interval: tuple[float, float]
@@ -28,11 +30,11 @@ class HandOff:
 def hand_off(human: Array, stg: Array, operators: Sequence[str], margins: Array, seed: int) -> HandOff | None:
     """Compare times (T, K) of the same trials by hand and by snap, trial by trial.
 
-    From the margin where the snap saves most, go to larger margins for as long as the 95 % interval of the
-    saved seconds lies above 0: the last one is where the curves part.
+    A snap saves time for sure where the 95 % interval of the saved seconds lies above 0. From the margin
+    where it saves most for sure, go to larger ones for as long as it does: at the last one the curves part.
 
     Returns:
-        None where a snap saves nothing for sure at the margin where it saves most.
+        None where a snap saves time for sure at no margin.
     """
     saved = by_operator(human - stg, operators).means
     known = np.isfinite(saved)
@@ -41,13 +43,14 @@ def hand_off(human: Array, stg: Array, operators: Sequence[str], margins: Array,
     with np.errstate(invalid="ignore"):
         mean = np.where(known, saved, 0.0).sum(axis=0) / count
     ahead = np.nan_to_num(low, nan=-1.0) > 0.0
-    best = int(np.where(count >= 2, mean, -np.inf).argmax())
-    if not ahead[best]:
+    if not ahead.any():
         return None
+    best = int(np.where(ahead, mean, -np.inf).argmax())
     behind = np.flatnonzero(~ahead[:best])
     first = int(behind[-1]) + 1 if len(behind) else 0
     return HandOff(
         margin=float(margins[first]),
+        is_largest=first == 0,
         best_margin=float(margins[best]),
         saved=float(mean[best]),
         saved_interval=(float(low[best]), float(high[best])),

@@ -5,6 +5,7 @@ from itertools import groupby, pairwise
 from typing import NamedTuple
 
 from app.analysis.logs import LoggedRow
+from app.event_log import STATE_AFTER
 
 JUMP_SECONDS = 1.0
 """By which a clock has to be off before it is said; the machine's own is corrected by less all the time."""
@@ -19,9 +20,9 @@ class Fault(NamedTuple):
 
 
 def faults_of(rows: Sequence[LoggedRow]) -> list[Fault]:
-    """What is wrong with the events of a registration, in their order."""
+    """What is wrong with the events of a registration that was submitted, in their order."""
     runs = [list(run) for _, run in groupby(rows, key=lambda row: row.boot_id)]
-    found = [*_gaps(rows), *_backward_clocks(runs), *_backward_runs(runs)]
+    found = [*_gaps(rows), *_lost_end(rows), *_backward_clocks(runs), *_backward_runs(runs)]
     for run in runs:
         if jump := _utc_jump(run):
             text = f"the clock was put {'forward' if jump > 0 else 'back'} by {abs(jump):.0f} s"
@@ -41,6 +42,14 @@ def _gaps(rows: Sequence[LoggedRow]) -> list[Fault]:
             found.append(Fault(f"the log has a gap: {missing} missing", True))
         expected = row.sequence + 1
     return found
+
+
+def _lost_end(rows: Sequence[LoggedRow]) -> list[Fault]:
+    """No sequence number tells that the last events are missing."""
+    changes = [row.kind for row in rows if row.kind in STATE_AFTER]
+    if changes and STATE_AFTER[changes[-1]] == "submitted":
+        return []
+    return [Fault("the log has a gap: its end with the submission is missing", True)]
 
 
 def _backward_clocks(runs: Sequence[Sequence[LoggedRow]]) -> list[Fault]:

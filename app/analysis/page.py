@@ -1,10 +1,12 @@
 """A report as one HTML file that opens anywhere: no script, nothing from elsewhere."""
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
 from app.analysis.bootstrap import RESAMPLES, Interval
-from app.analysis.figure import figure_bytes
+from app.analysis.figure import figure_bytes, shown_conditions
+from app.analysis.fitts import Fitts
 from app.analysis.pose_errors import PoseErrors
 from app.analysis.remarks import counted
 from app.analysis.report import Report
@@ -26,12 +28,11 @@ figure { margin: 1rem 0; padding: 1rem; background: #fff; } figure svg { width: 
 def page_of(report: Report) -> str:
     """The page, UTF-8."""
     title = escape(f"{report.collected.name}: report")
-    svg = figure_bytes(report, "svg").decode()
     parts = [
         f"<h1>{title}</h1>",
         _simulated(report),
         f"<p>{_counts(report)}</p>",
-        f"<figure>{svg[svg.index('<svg') :]}</figure>",
+        *(_figure(report, condition) for condition in shown_conditions(report)),
         _section("Does a snap improve rotation as well?", _answers(report), _gains(report)),
         _section("Hand-off", [], _hand_offs(report)),
         _section("Fitts' law: time = a + b log2(D/W + 1)", [], _fitts(report)),
@@ -46,6 +47,11 @@ def page_of(report: Report) -> str:
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
         f"<style>{STYLE}</style>\n</head>\n<body>\n" + "\n".join(filter(None, parts)) + "\n</body>\n</html>\n"
     )
+
+
+def _figure(report: Report, condition: str) -> str:
+    svg = figure_bytes(report, "svg", condition).decode()
+    return f"<figure>{svg[svg.index('<svg') :]}</figure>"
 
 
 def _simulated(report: Report) -> str:
@@ -116,7 +122,7 @@ def _hand_offs(report: Report) -> str:
                 cell.mode,
                 cell.condition,
                 cell.error,
-                told(cell.hand_off.margin, cell.error)
+                told(cell.hand_off.margin, cell.error) + " or more" * cell.hand_off.is_largest
                 if cell.hand_off
                 else "no margin: nothing is saved for sure",
                 told(cell.hand_off.best_margin, cell.error) if cell.hand_off else "–",
@@ -148,7 +154,7 @@ def _fitts(report: Report) -> str:
                 interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
                 interval_told(Interval(line.b, *line.b_interval, cell.operators), None) + " a bit",
                 number_told(line.r_squared),
-                number_told(line.throughput),
+                _throughput(line),
             )
             for cell in report.cells
             for hand, drawn in (("human", cell.human), ("STG", cell.stg))
@@ -157,11 +163,27 @@ def _fitts(report: Report) -> str:
     )
 
 
+def _throughput(line: Fitts) -> str:
+    low, high = (number_told(bound) for bound in line.throughput_interval)
+    sure = f" ({low} to {high})" if math.isfinite(line.throughput_interval[0]) else ""
+    return f"{number_told(line.throughput)}{sure}"
+
+
 def _comparisons(report: Report) -> str:
     return _table(
-        ("mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"),
+        (
+            "group",
+            "mode",
+            "difference",
+            "pairs",
+            "operators",
+            "seconds",
+            "final translation",
+            "final rotation",
+        ),
         (
             (
+                pair.group,
                 pair.mode,
                 f"{pair.second} − {pair.first}",
                 pair.pairs,

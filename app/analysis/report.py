@@ -12,7 +12,8 @@ from app.analysis.collect import Collected, TruthSource, trials_of
 from app.analysis.comparison import Comparison, comparisons
 from app.analysis.curves import MARGINS, SNAP_SECONDS, Timing
 from app.analysis.gains import Gain, gains
-from app.analysis.remarks import Remark
+from app.analysis.remarks import Remark, counted
+from app.analysis.selection import Selection
 from app.analysis.trial import ERROR_KINDS, TrialTrace
 from app.analysis.units import told
 from app.database import Database
@@ -48,14 +49,21 @@ class Report:
     remarks: Sequence[Remark]
 
 
-def study_report(database: Database, study_id: int, config: ReportConfig | None = None) -> Report:
-    """The report of a whole study.
+def study_report(
+    database: Database,
+    study_id: int,
+    config: ReportConfig | None = None,
+    part: Selection | None = None,
+) -> Report:
+    """The report of a study, or of a part of it.
 
     Raises:
         LookupError: where there is no such study.
+        ValueError: where a part is none of the study's.
     """
     config = config or ReportConfig()
-    return report_of(trials_of(database, study_id, config.truth), config)
+    collected = trials_of(database, study_id, config.truth)
+    return report_of(part.of(collected) if part else collected, config)
 
 
 def report_of(collected: Collected, config: ReportConfig) -> Report:
@@ -67,7 +75,7 @@ def report_of(collected: Collected, config: ReportConfig) -> Report:
         cells=cells_of(trials, config.timing, config.seed),
         gains=[gain for _, part in groupby(trials, key=key_of) for gain in gains(list(part), config.seed)],
         comparisons=comparisons(trials, config.timing, config.seed),
-        remarks=[*collected.remarks, *_never_within(trials)],
+        remarks=[*collected.remarks, *_idle(trials, config), *_never_within(trials)],
     )
 
 
@@ -96,6 +104,21 @@ def _order(collected: Collected) -> Callable[[TrialTrace], tuple[int, str, bool,
         trial.condition,
         trial.registration_id,
     )
+
+
+def _idle(trials: Sequence[TrialTrace], config: ReportConfig) -> list[Remark]:
+    """How much of the time nothing happened: one who left the desk may outweigh all others in a mean."""
+    idle = [float(trial.seconds[-1] - trial.active_seconds[-1]) for trial in trials]
+    count = sum(seconds > 0.0 for seconds in idle)
+    if not count:
+        return []
+    longest = int(np.argmax(idle))
+    text = (
+        f"{count} of {counted(len(trials), 'trial')} {'has' if count == 1 else 'have'} some,"
+        f" {sum(idle):.0f} s in all and at most {idle[longest]:.0f} s, of {trials[longest].operator};"
+        f" it {'is left out' if config.without_idle else 'counts'}"
+    )
+    return [Remark("idle time", text, trials[longest].registration_id)]
 
 
 def _never_within(trials: Sequence[TrialTrace]) -> list[Remark]:

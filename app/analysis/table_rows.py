@@ -45,6 +45,8 @@ def _fitts_rows(report: Report) -> Iterator[Row]:
                 "b_high": line.b_interval[1],
                 "r_squared": line.r_squared,
                 "bits_per_second": line.throughput,
+                "bits_per_second_low": line.throughput_interval[0],
+                "bits_per_second_high": line.throughput_interval[1],
             }
 
 
@@ -53,6 +55,7 @@ def _hand_off_rows(report: Report) -> Iterator[Row]:
         if (point := cell.hand_off) is not None:
             yield _cell_row(cell) | {
                 "margin": in_people_units(point.margin, cell.error),
+                "is_largest": point.is_largest,
                 "best_margin": in_people_units(point.best_margin, cell.error),
                 "saved_seconds": point.saved,
                 "saved_low": point.saved_interval[0],
@@ -83,6 +86,7 @@ def _gain_rows(report: Report) -> Iterator[Row]:
 def _comparison_rows(report: Report) -> Iterator[Row]:
     for pair in report.comparisons:
         yield {
+            "group": pair.group,
             "mode": pair.mode,
             "first": pair.first,
             "second": pair.second,

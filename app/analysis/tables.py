@@ -40,7 +40,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
             ("distance", NUMBER),
             ("margins", INTEGER),
             *((name, NUMBER) for name in ("a", "a_low", "a_high", "b", "b_low", "b_high", "r_squared")),
-            ("bits_per_second", NUMBER),
+            *((f"bits_per_second{end}", NUMBER) for end in ("", "_low", "_high")),
             SIMULATED,
         ]
     ),
@@ -48,6 +48,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
         [
             *CELL,
             ("margin", NUMBER),
+            ("is_largest", TRUTH),
             ("best_margin", NUMBER),
             ("saved_seconds", NUMBER),
             ("saved_low", NUMBER),
@@ -74,6 +75,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
     ),
     "comparisons": pa.schema(
         [
+            ("group", TEXT),
             ("mode", TEXT),
             ("first", TEXT),
             ("second", TEXT),

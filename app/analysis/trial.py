@@ -44,6 +44,8 @@ class TrialTrace(TrialInfo):
     """Of the pose at these times."""
     stg_errors: PoseErrors
     """Of what a snap gives from there; NaN where there is none."""
+    missing_snaps: int
+    """Samples from which a snap is still to be computed; 0 in ordinary work, where none is."""
 
     def of_kind(self, kind: ErrorKind) -> Array:
         """Errors (M,) of the pose, metres or radians."""
@@ -60,7 +62,12 @@ class TrialTrace(TrialInfo):
 
 
 def traced(
-    info: TrialInfo, trace: Trace, times: Array, errors: PoseErrors, stg_errors: PoseErrors
+    info: TrialInfo,
+    trace: Trace,
+    times: Array,
+    errors: PoseErrors,
+    stg_errors: PoseErrors,
+    missing_snaps: int = 0,
 ) -> TrialTrace:
     """Join what is known of a trial at the times (M,) of its trace."""
     seconds = times - trace.first_sight
@@ -71,6 +78,7 @@ def traced(
         idle=trace.is_idle(times),
         errors=errors,
         stg_errors=stg_errors,
+        missing_snaps=missing_snaps,
     )
 
 

@@ -15,7 +15,7 @@ def in_people_units(value: float, kind: ErrorKind) -> float:
 
 def number_told(value: float) -> str:
     """Three significant digits; "–" for NaN."""
-    return f"{value:.3g}" if math.isfinite(value) else "–"
+    return f"{float(f'{value:.3g}'):g}" if math.isfinite(value) else "–"
 
 
 def share_told(value: float) -> str:

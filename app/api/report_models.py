@@ -47,6 +47,7 @@ class FittsOut(BaseModel):
     b_interval: tuple[float | None, float | None]
     r_squared: float | None
     throughput: float | None = Field(description="bits a second")
+    throughput_interval: tuple[float | None, float | None]
 
 
 class CurveOut(BaseModel):
@@ -60,6 +61,7 @@ class HandOffOut(BaseModel):
     """Where a snap begins to save time, and where it saves most."""
 
     margin: float
+    is_largest: bool = Field(description="of all margins: the curves may part farther out")
     best_margin: float
     saved: float
     saved_interval: tuple[float, float]
@@ -100,6 +102,7 @@ class GainOut(BaseModel):
 class ComparisonOut(BaseModel):
     """Differences second - first over pairs of the same operator and task."""
 
+    group: str = Field(description="or `all groups`")
     mode: str
     first: str
     second: str
@@ -192,4 +195,5 @@ def _fitts(line: Fitts) -> FittsOut:
         b_interval=(number(line.b_interval[0]), number(line.b_interval[1])),
         r_squared=number(line.r_squared),
         throughput=number(line.throughput),
+        throughput_interval=(number(line.throughput_interval[0]), number(line.throughput_interval[1])),
     )

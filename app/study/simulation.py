@@ -4,7 +4,7 @@ Whatever they do is marked: the study and its participants are simulated, and th
 the server that is named so (`SimulatedClock.boot_id`).
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from itertools import chain, islice, zip_longest
 from typing import cast
@@ -70,9 +70,7 @@ def create_simulated(workplace: Workplace, name: str, plan: StudyPlan, seed: int
     """
     _check(workplace, plan)
     study = workplace.studies.create(name, plan, seed, user_id, is_simulated=True)
-    for group, count in plan.groups.items():
-        for _ in range(count):
-            workplace.studies.add_participant(study.id, group, is_simulated=True)
+    _complete(workplace, study.id)
     return study
 
 
@@ -84,6 +82,7 @@ def simulate(workplace: Workplace, study_id: int, on_progress: Callable[[int, in
         study_id: Whose participants.
         on_progress: Told how many trials are done, and of how many.
     """
+    _complete(workplace, study_id)
     participants = _participants(workplace.database, study_id)
     done, total = 0, sum(len(participant.trials) for participant in participants)
     for number, participant in enumerate(participants):
@@ -101,6 +100,16 @@ def simulate(workplace: Workplace, study_id: int, on_progress: Callable[[int, in
         finally:
             desk.close()
         workplace.studies.finish(participant.id)
+
+
+def _complete(workplace: Workplace, study_id: int) -> None:
+    """Add whoever is missing in the groups: setting up a study may have been interrupted, too."""
+    with workplace.database.read() as session:
+        groups = session.get_one(Study, study_id).plan["groups"]
+        there = Counter(session.scalars(select(Participant.group).where(Participant.study_id == study_id)))
+    for group, count in groups.items():
+        for _ in range(count - there[group]):
+            workplace.studies.add_participant(study_id, group, is_simulated=True)
 
 
 def _check(workplace: Workplace, plan: StudyPlan) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from sqlalchemy import func, insert, select
 from sqlalchemy.exc import IntegrityError
 
@@ -77,6 +78,14 @@ class SnapStore:
             raise StoreError(
                 "Another batch stores the offline snaps of the same registrations. Let one of them end first."
             ) from error
+
+    def median_seconds(self, registration_ids: Sequence[int]) -> float:
+        """What the snaps of registrations took, each counting once, as measured; NaN where there are none."""
+        query = select(OfflineSnap.input_hash, OfflineSnap.snap_seconds)
+        with self._database.read() as session:
+            rows = session.execute(query.where(OfflineSnap.registration_id.in_(registration_ids)))
+            seconds = {row.input_hash: row.snap_seconds for row in rows}
+        return float(np.median(list(seconds.values()))) if seconds else np.nan
 
     def failures(self, registration_ids: Sequence[int]) -> int:
         """How many samples of registrations have a snap that failed."""

@@ -21,6 +21,7 @@ export function chart(title, error, series) {
     { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, tabindex: 0, role: "application", "aria-roledescription": "chart", "aria-label": title },
     ...axes(scales, error),
     ...series.map((one) => svg("path", { class: `share ${one.hand}`, d: areaPath(one.points, scales) })),
+    ...series.map((one) => svg("path", { class: `share-edge ${one.hand} ${one.mode}`, d: sharePath(one.points, scales) })),
     ...series.map((one) => svg("path", { class: `band ${one.hand}`, d: bandPath(one.points, scales) })),
     ...series.flatMap((one) => curve(one, scales)),
     mark,
@@ -118,9 +119,13 @@ function curve(one, scales) {
   ];
 }
 
-function areaPath(points, { x, share }) {
-  const top = points.map((point, i) => `${i ? "L" : "M"}${x(point.margin)} ${share(point.share)}`).join("");
-  return `${top}L${x(points.at(-1).margin)} ${BOX.bottom}L${x(points[0].margin)} ${BOX.bottom}Z`;
+function sharePath(points, { x, share }) {
+  return points.map((point, i) => `${i ? "L" : "M"}${x(point.margin)} ${share(point.share)}`).join("");
+}
+
+function areaPath(points, scales) {
+  const { x } = scales;
+  return `${sharePath(points, scales)}L${x(points.at(-1).margin)} ${BOX.bottom}L${x(points[0].margin)} ${BOX.bottom}Z`;
 }
 
 function bandPath(points, { x, y }) {
@@ -141,6 +146,6 @@ function axes(scales, error) {
     ...scales.margins.map((margin) => text({ x: scales.x(margin), y: BOX.bottom + 16, "text-anchor": "middle" }, margin)),
     text({ x: (BOX.left + BOX.right) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, `error margin [${unitOf(error)}]`),
     text({ x: 12, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(-90 12 ${HEIGHT / 2 - 16})` }, "seconds"),
-    text({ x: WIDTH - 6, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(90 ${WIDTH - 6} ${HEIGHT / 2 - 16})` }, "remaining"),
+    text({ x: WIDTH - 6, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(90 ${WIDTH - 6} ${HEIGHT / 2 - 16})` }, "share remaining"),
   ];
 }

@@ -15,7 +15,7 @@ export function drawPanels(cells, names, { errors, isSimulated }) {
   });
   byId("panels").replaceChildren(...(panels.length ? panels : [element("p", { className: "panel" }, "There are no trials to show.")]));
   const legend = new Map(shown.flatMap((cell) => seriesOf(cell, names)).map((one) => [one.name, one]));
-  byId("legend").replaceChildren(...[...legend.values()].map(legendEntry), element("li", { className: "muted" }, "shade: share that remains (right); band: 95 % interval"));
+  byId("legend").replaceChildren(...[...legend.values()].map(legendEntry), element("li", { className: "muted" }, "band: 95 % interval; dotted: share remaining (right)"));
 }
 
 /** All numbers of the curves, for whoever cannot see them. */

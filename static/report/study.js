@@ -96,7 +96,8 @@ function handOffs({ cells }) {
       if (point === null) return [...cellOf(cell), "no margin: nothing is saved for sure", "–", "–"];
       const [low, high] = point.saved_interval;
       const saved = intervalText({ mean: point.saved, low, high }, secondsText);
-      return [...cellOf(cell), errorText(point.margin, cell.error), errorText(point.best_margin, cell.error), saved];
+      const from = `${errorText(point.margin, cell.error)}${point.is_largest ? " or more" : ""}`;
+      return [...cellOf(cell), from, errorText(point.best_margin, cell.error), saved];
     });
   const head = ["group", "mode", "condition", "error", "let the machine take over from", "saves most at", "seconds saved there"];
   return rows.length ? section("Hand-off", tableOf(head, rows)) : null;
@@ -109,7 +110,8 @@ function fitts({ cells }) {
       .map((hand) => {
         const line = cell[hand].fitts;
         const told = (name) => intervalText({ mean: line[name], low: line[`${name}_interval`][0], high: line[`${name}_interval`][1] }, secondsText);
-        return [...cellOf(cell), NAMES[hand], errorText(line.distance, cell.error), line.margins, told("a"), told("b"), digits(line.r_squared), digits(line.throughput)];
+        const bits = intervalText({ mean: line.throughput, low: line.throughput_interval[0], high: line.throughput_interval[1] }, digits);
+        return [...cellOf(cell), NAMES[hand], errorText(line.distance, cell.error), line.margins, told("a"), told("b"), digits(line.r_squared), bits];
       }),
   );
   const head = ["group", "mode", "condition", "error", "by", "D", "margins", "a", "b a bit", "R²", "bits/s"];
@@ -118,6 +120,7 @@ function fitts({ cells }) {
 
 function comparisons({ comparisons: pairs }) {
   const rows = pairs.map((pair) => [
+    pair.group,
     pair.mode,
     `${pair.second} − ${pair.first}`,
     pair.pairs,
@@ -126,7 +129,7 @@ function comparisons({ comparisons: pairs }) {
     intervalText(pair.translation, (value) => errorText(value, "translation")),
     intervalText(pair.rotation, (value) => errorText(value, "rotation")),
   ]);
-  const head = ["mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"];
+  const head = ["group", "mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"];
   return rows.length ? section("Conditions in pairs", tableOf(head, rows)) : null;
 }
 
@@ -153,13 +156,17 @@ function method({ config }) {
   );
 }
 
-function downloads(url, asked) {
-  const given = Object.entries(asked).filter(([, value]) => value !== "");
-  const link = (name, text) => element("a", { href: `${url}/files/${name}?${new URLSearchParams(given)}`, download: "" }, text);
+/** The figure is of the condition that is shown; the page and the tables are of all, which they compare. */
+function downloads(url, { condition, ...asked }) {
+  const link = (name, text, wanted = asked) => {
+    const given = Object.entries(wanted).filter(([, value]) => value !== "");
+    return element("a", { href: `${url}/files/${name}?${new URLSearchParams(given)}`, download: "" }, text);
+  };
+  const figure = { ...asked, condition };
   const rows = TABLES.map((name) => [name.replace("_", "-"), link(`${name}.csv`, "CSV"), link(`${name}.parquet`, "Parquet")]);
   return section(
     "Download",
-    element("p", { className: "row" }, link("figure.svg", "Figure (SVG)"), link("figure.pdf", "Figure (PDF)"), link("report.html", "Report (HTML)")),
+    element("p", { className: "row" }, link("figure.svg", "Figure (SVG)", figure), link("figure.pdf", "Figure (PDF)", figure), link("report.html", "Report (HTML)")),
     tableOf(["table", "CSV", "Parquet"], rows),
   );
 }

@@ -39,11 +39,24 @@ def test_from_simulated_operators_to_a_report(study, tmp_path):
     assert done.stdout == "Study try: all simulated operators are done.\n", done.stderr
     assert study("list").stdout == "try (simulated, open): 2 participants, 4 of 4 tasks submitted\n"
     printed = study("snap", "try").stdout
-    assert printed.startswith("Study try: ") and printed.endswith(" snaps computed, 0 failed.\n")
+    assert printed.startswith("Study try: ") and " snaps computed, 0 failed. A snap took " in printed
     assert ", 0 snaps computed" in study("snap", "try").stdout
     written = study("report", "try", "--out", str(tmp_path / "report")).stdout.splitlines()
     assert str(tmp_path / "report" / "figure.svg") in written
     assert all(Path(path).stat().st_size for path in written)
+    report = ("report", "try", "--out", str(tmp_path / "part"))
+    assert study(*report, "--group", "expert", "--mode", "quick").returncode == 0
+    curves = (tmp_path / "part" / "curves.csv").read_text().splitlines()
+    assert len(curves) == 1 + 2 * 2 * 41 and all('"expert","quick"' in line for line in curves[1:])
+    assert "mode 'slow' is none of this study; there are: accurate, quick" in failure(
+        study(*report, "--mode", "slow")
+    )
+    (tmp_path / "file").touch()
+    message = failure(study("report", "try", "--out", str(tmp_path / "file" / "report")))
+    assert message.endswith("Not a directory; choose another folder with --out")
+    again = study("simulate", "try", "--operators", "3")
+    assert again.stdout.startswith("Study try goes on as it was set up, whatever --operators")
+    assert study("list").stdout == "try (simulated, open): 2 participants, 4 of 4 tasks submitted\n"
     assert study("erase", "try", "P01").stdout == "All that P01 did and answered is erased.\n"
     assert study("list").stdout == "try (simulated, open): 2 participants, 2 of 2 tasks submitted\n"
 

@@ -96,7 +96,9 @@ class HandMadeStudy:
                 return None
             return write_log(session, task, participant.user_id, entries, state, skip_sequence)
 
-    def snaps(self, registration_id: int, results: dict[float, np.ndarray | None]) -> None:
+    def snaps(
+        self, registration_id: int, results: dict[float, np.ndarray | None], version: str = "0"
+    ) -> None:
         """Offline snaps by seconds of the trace; None is one that failed."""
         with self.database.write() as session:
             session.add_all(
@@ -110,7 +112,7 @@ class HandMadeStudy:
                     T_world_object=None if T is None else T.tolist(),
                     snap_seconds=0.01,
                     evaluations=1,
-                    version="0",
+                    version=version,
                     hardware="paper",
                 )
                 for seconds, T in results.items()

@@ -65,6 +65,21 @@ def test_snaps_are_put_beside_the_poses_that_they_began_from(database):
     assert trial.stg_errors.rotation[0] == pytest.approx(0.03)
     assert np.isnan(trial.stg_errors.translation[1:]).all()
     assert "offline snaps: 1 of 2 failed" in said(collected)
+    # 5 s are sampled at 11 poses, two of which have their snap
+    assert trial.missing_snaps == 9 and "offline snaps: 9 of 11 sampled poses have none yet" in said(
+        collected
+    )
+    assert "versions" not in said(collected)
+
+
+def test_snaps_of_two_versions_are_not_taken_for_one_in_silence(database):
+    study = HandMadeStudy(database)
+    registration = study.trial(study.participant("P1"), two_moves(3.0, 6.0, at(0.0)))
+    assert registration is not None
+    study.snaps(registration, every_half_second(6.0, at(0.0)), version="1")
+    assert said(trials_of(database, study.id)) == ""
+    study.snaps(registration, {1.0 + 1e-9: at(0.0)}, version="2")
+    assert "of several versions of Snap6D, 1, 2, and are shown as one" in said(trials_of(database, study.id))
 
 
 def test_whatever_is_left_out_is_said(database):
@@ -81,6 +96,7 @@ def test_whatever_is_left_out_is_said(database):
     study.trial(one, good, mode="quick", instance=96, reference=at(0.001))
     study.trial(one, good, mode="quick", skip_sequence=3)
     study.trial(one, [], condition="snap")
+    study.trial(one, good[:-1], mode="quick", condition="auto")
     study.trial(gone, good)
     late = [Entry(0.0, "opened"), Entry(5.0, "drag", late=99.0), moved(9.0, "submit", at(0.0), late=99.0)]
     study.trial(one, late, condition="auto")
@@ -97,6 +113,7 @@ def test_whatever_is_left_out_is_said(database):
         "#97: has no accurate registration by hand; its reference pose is the ground truth",
         "quick, manual: the log has a gap: event 3 is missing; left out",
         "accurate, snap: has no log; left out",
+        "quick, auto: the log has a gap: its end with the submission is missing; left out",
         "accurate, auto: the clock was put forward by 99 s; the server's steady clock was used",
     ):
         assert words in text

@@ -19,11 +19,21 @@ TRIALS = [
 
 def test_pairs_are_compared_operator_by_operator():
     (found,) = comparisons(TRIALS, Timing(), seed=0)
-    assert (found.mode, found.first, found.second) == ("accurate", "manual", "snap")
+    assert (found.group, found.mode, found.first, found.second) == ("novice", "accurate", "manual", "snap")
     assert (found.pairs, found.seconds.operators) == (2, 2)
     assert found.seconds.mean == pytest.approx(-1.0)  # -0.5 s and -1.5 s
     assert (found.seconds.low, found.seconds.high) == pytest.approx((-1.5, -0.5))
     assert found.translation.mean == pytest.approx(-0.015)
+
+
+def test_each_group_is_compared_alone_and_all_of_them_together():
+    expert = [
+        trial([0.1] * 5, operator="E1", group="expert"),  # 2 s
+        trial([0.1], operator="E1", group="expert", condition="snap"),  # at once
+    ]
+    found = comparisons([*TRIALS, *expert], Timing(), seed=0)
+    assert [(one.group, one.pairs) for one in found] == [("novice", 2), ("expert", 1), ("all groups", 3)]
+    assert [one.seconds.mean for one in found] == pytest.approx([-1.0, -2.0, -4.0 / 3.0])
 
 
 def test_all_conditions_are_compared_with_each_other():

@@ -24,6 +24,7 @@ def test_a_line_is_found_exactly_with_the_interval_over_operators():
     assert line.throughput == pytest.approx(1 / 0.3)
     assert line.a_interval == pytest.approx((0.5, 0.7))
     assert line.b_interval == pytest.approx((0.2, 0.4))
+    assert line.throughput_interval == pytest.approx((1 / 0.4, 1 / 0.2))
 
 
 def test_margins_that_less_than_half_come_within_do_not_bend_it():
@@ -46,3 +47,6 @@ def test_too_few_margins_give_no_line_and_a_flat_one_no_throughput():
     assert fitts(curve_of(rows, ["P1"], MARGINS, seed=0), 0.06, seed=0) is None
     flat = fitts(curve_of(np.full((1, 5), 2.0), ["P1"], MARGINS, seed=0), DISTANCE, seed=0)
     assert flat is not None and flat.b == 0.0 and np.isnan(flat.throughput) and np.isnan(flat.r_squared)
+    up_and_down = curve_of(np.array([times(0.5, 0.3), times(0.5, -0.1)]), ["P1", "P2"], MARGINS, seed=0)
+    line = fitts(up_and_down, DISTANCE, seed=0)
+    assert line is not None and line.b == pytest.approx(0.1) and np.isnan(line.throughput_interval).all()

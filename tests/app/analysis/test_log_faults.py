@@ -26,7 +26,7 @@ def rows_of(*entries: Entry, skip: int = 0) -> list[LoggedRow]:
 
 
 def test_a_whole_log_has_none_even_over_runs_of_the_server():
-    rows = rows_of(Entry(0, "opened"), Entry(5, "drag"), Entry(90, "opened", boot_id="b", clock=2.0))
+    rows = rows_of(Entry(0, "opened"), Entry(5, "drag"), Entry(90, "submit", boot_id="b", clock=2.0))
     assert faults_of(rows) == []
 
 
@@ -35,6 +35,13 @@ def test_a_gap_is_named():
     assert fault == ("the log has a gap: events 2 to 3 are missing", True)
     (fault,) = faults_of(rows_of(Entry(0, "opened"), Entry(5, "submit"), skip=1))
     assert fault.text.endswith("event 2 is missing")
+
+
+def test_an_end_that_is_missing_is_named_though_no_number_is_left_out():
+    lost = ("the log has a gap: its end with the submission is missing", True)
+    assert faults_of(rows_of(Entry(0, "opened"), Entry(5, "drag"))) == [lost]
+    assert faults_of(rows_of(Entry(0, "opened"), Entry(5, "submit"), Entry(6, "reopen"))) == [lost]
+    assert faults_of(rows_of(Entry(0, "opened"), Entry(5, "submit"), Entry(6, "view"))) == []
 
 
 def test_utc_that_jumps_within_one_run_does_no_harm():
@@ -49,12 +56,12 @@ def test_utc_that_jumps_where_runs_are_joined_by_it_spoils_the_times():
         rows_of(
             Entry(0, "opened"),
             Entry(5, "drag", late=60),
-            Entry(9, "opened", boot_id="b", late=60),
+            Entry(9, "submit", boot_id="b", late=60),
         )
     )
     assert [fault.spoils_times for fault in faults] == [True]
     assert "forward by 60 s" in faults[0].text
-    (fault,) = faults_of(rows_of(Entry(60, "opened"), Entry(70, "opened", boot_id="b", late=-40.0)))
+    (fault,) = faults_of(rows_of(Entry(60, "opened"), Entry(70, "submit", boot_id="b", late=-40.0)))
     assert fault == ("the clock was put back by 30 s between two runs of the server", True)
 
 

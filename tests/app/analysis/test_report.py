@@ -121,6 +121,27 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_what_was_handled(report)
     assert "<script" not in html and 'src="' not in html and "<link" not in html
 
 
+def test_techniques_have_a_figure_each_and_are_compared_in_pairs_in_the_page():
+    trials = (four("P1"), four("P1", condition="find it"), four("P2"), four("P2", condition="find it"))
+    techniques = report_of(collected_of(*trials), ReportConfig())
+    html = file_of(techniques, "report.html").decode()
+    assert html.count("<figure>") == 2 and "mugs &amp; &lt;bowls&gt;: find it</text>" in html
+    assert "<td>find it − manual</td><td>2</td>" in html
+    svg = file_of(techniques, "figure.svg").decode()
+    assert ": manual</text>" in svg and ": find it</text>" not in svg
+
+
+def test_idle_time_is_said_whether_or_not_it_counts():
+    trials = (four("P1"), four("P2", idle_seconds=1.0), four("P3", idle_seconds=0.5))
+    counts, left_out = (
+        report_of(collected_of(*trials), ReportConfig(without_idle=way)) for way in (False, True)
+    )
+    said = "idle time: 2 of 3 trials have some, 2 s in all and at most 1 s, of P2; it"
+    assert any(str(remark) == f"{said} counts." for remark in counts.remarks)
+    assert any(str(remark) == f"{said} is left out." for remark in left_out.remarks)
+    assert "idle time" not in "".join(map(str, report_of(collected_of(four("P1")), ReportConfig()).remarks))
+
+
 def test_the_same_trials_give_the_same_bytes_in_any_order(report, tmp_path):
     again = report_of(collected_of(*reversed(report.collected.trials)), ReportConfig())
     paths = write_report(again, tmp_path / "out")
@@ -137,5 +158,6 @@ def test_a_study_of_nothing_still_has_a_report(tmp_path):
 
 def test_numbers_are_told_with_their_units():
     assert told(0.00421, "translation") == "4.21 mm" and told(float("nan"), "rotation") == "–"
+    assert told(1.2345, "translation") == "1230 mm"
     assert interval_told(Interval(1.0, 0.5, 2.0, 5), None) == "1 s (0.5 s to 2 s)"
     assert interval_told(Interval(0.01, float("nan"), float("nan"), 1), "translation") == "10 mm"

@@ -47,4 +47,5 @@ def trial(
         idle=(seconds > 0) & (seconds < idle_seconds),
         errors=errors(translation, rotation if rotation is not None else [0.0] * count),
         stg_errors=errors(stg_translation, stg_rotation if stg_rotation is not None else stg_translation),
+        missing_snaps=0 if stg_translation is not None else count,
     )

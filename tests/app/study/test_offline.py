@@ -15,7 +15,7 @@ from app.snapping import SnapError
 from app.study.offline import OfflineBatch, OfflineError, Summary
 from app.study.samples import samples_of
 from app.study.simulated_operator import SimulatedClock
-from app.study.snap_store import StoreError
+from app.study.snap_store import SnapStore, StoreError
 from app.tables import OfflineSnap, utc_now
 from registration_core import SnapConfig, pose, snap
 from tests.app.small_dataset import TOOL, true_pose
@@ -85,6 +85,8 @@ def test_every_sample_has_its_snap_and_a_pose_that_rests_is_one_input(made):
     rows = made.rows(registration_id)
     assert [row.seconds for row in rows] == pytest.approx(np.arange(17) / 2)
     assert len({row.input_hash for row in rows}) == 4
+    took = {row.input_hash: row.snap_seconds for row in rows}  # one that rests counts once
+    assert SnapStore(made.services.database).median_seconds([registration_id]) == np.median([*took.values()])
     events = until_submission(made.services.log.events(registration_id))
     trace = trace_of(np.eye(4).tolist(), events)
     for row in rows:

@@ -13,6 +13,7 @@ from app.auth import Role
 from app.services import Services
 from app.study.plan import StudyPlan
 from app.study.simulation import SimulationError, create_simulated, simulate
+from app.study.studies import Studies
 from app.study.workplace import Workplace
 from app.tables import Event, Participant, Registration, Study, Task
 from registration_core import pose
@@ -152,6 +153,25 @@ def test_who_was_interrupted_goes_on_later_and_the_clock_never_back(services, wo
         of_user = [event for log in events_of(services, study) for event in log if event.user_id == user_id]
         seconds = [event.monotonic_seconds for event in of_user]
         assert seconds == sorted(seconds)
+
+
+def test_a_study_whose_setting_up_was_interrupted_is_completed(services, workplace, monkeypatch):
+    add, added = Studies.add_participant, []
+
+    def interrupt(*given, **more):
+        if added:
+            raise KeyboardInterrupt
+        added.append(add(*given, **more))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Studies, "add_participant", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            created(workplace, services)
+    with services.database.read() as session:
+        study = session.scalars(select(Study)).one()
+    simulate(workplace, study.id, ignore)
+    rows = registrations_of(services, study)
+    assert len(rows) == 6 and {row.state for _, row, _ in rows} == {"submitted"}
 
 
 @pytest.mark.parametrize(
