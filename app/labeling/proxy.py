@@ -12,7 +12,8 @@ from fastapi import APIRouter, Depends, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from app.api.dependencies import Id, SeatDep, get_services, identify, is_same_origin
-from app.labeling.desk import NotFoundError, Seat
+from app.labeling.desk import NotFoundError
+from app.labeling.seat import Seat
 from app.services import Services
 
 router = APIRouter(include_in_schema=False)

@@ -22,7 +22,8 @@ from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
 from app.labeling.history import History, Step
 from app.labeling.layers import Layers
-from app.labeling.machine import Machine, SamePose
+from app.labeling.machine import Machine
+from app.labeling.same_pose import SamePose
 from app.labeling.search import Region, RequestSearch, Search, SearchOrder
 from app.labeling.snap_exchange import (
     KnownObject,
