@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.seat import Seat
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 from app.labeling.tools import Tool
 from app.tables import Pose
 from registration_core import pose

@@ -9,7 +9,7 @@ from app.labeling.coloring import Coloring
 from app.labeling.frame_view import first_view_of, show_cloud_of
 from app.labeling.layers import Layers
 from app.labeling.seat import Seat
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 from app.labeling.uncertainty import Uncertainty
 from app.labeling.view import DragHandlers, SceneView
 from app.scene_data import SceneData

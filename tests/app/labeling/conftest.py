@@ -5,6 +5,7 @@ import pytest
 from app.auth import Identity
 from app.labeling.seat import Seat
 from app.services import Services
+from tests.app.labeling.bench import Bench
 from tests.app.labeling.seats import sign_up
 
 
@@ -17,3 +18,9 @@ def ann(services: Services) -> Identity:
 def seat(services: Services, ann: Identity) -> Seat:
     """Ann before the first task: the angle tool of scene 1."""
     return services.desk.start(1, ann)
+
+
+@pytest.fixture
+def bench() -> Bench:
+    """A session whose log and workers the test holds."""
+    return Bench()
