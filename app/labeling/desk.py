@@ -21,7 +21,7 @@ from app.labeling.same_pose import same_pose_of
 from app.labeling.scene_things import things_of_scene
 from app.labeling.seat import Seat
 from app.labeling.session import LabelingSession
-from app.labeling.snap_exchange import SnapStatus
+from app.labeling.session_state import SessionState
 from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.memory import give_back
@@ -94,11 +94,11 @@ class Desk:
         ):
             raise _not_found(registration_id)
 
-    def live_snap(self, registration_id: int) -> SnapStatus | None:
-        """The last snap of a registration whose session is live."""
+    def live_state(self, registration_id: int) -> SessionState | None:
+        """What the session of a registration tells; None where it is not live."""
         with self._lock:
             seat = self._seats.get(registration_id)
-        return seat.session.snapshot().snap if seat else None
+        return seat.session.snapshot() if seat else None
 
     def uncertainty(self, seat: Seat, snap_id: str | None) -> Uncertainty | None:
         """What is not known about a pose that stems from a snap; None where it stems from none.
@@ -112,12 +112,6 @@ class Desk:
             return None
         T_world_camera = np.array(seat.frames[estimate.frame_id].T_world_camera)
         return uncertainty_of(estimate, T_world_camera, seat.model.centre)
-
-    def live_search(self, registration_id: int) -> SnapStatus | None:
-        """The last search of a registration whose session is live."""
-        with self._lock:
-            seat = self._seats.get(registration_id)
-        return seat.session.snapshot().search if seat else None
 
     def view_port(self, seat: Seat) -> int:
         """The loopback port of a session's view, which is made where there is none."""

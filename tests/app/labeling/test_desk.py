@@ -93,10 +93,10 @@ def test_what_is_watched_or_was_used_lately_is_not_idle(services, seat):
 def test_closing_a_session_cancels_its_snap(services, seat, ann):
     snap_id = seat.session.snap(Actor.HUMAN, SnapConfig.from_dict(SLOW_SNAP))
     wait_until(lambda: seat.session.snapshot().snap.progress > 0, "the snap to run")
-    live = services.desk.live_snap(seat.registration.id)
-    assert live is not None and live.id == snap_id and live.is_live
+    live = services.desk.live_state(seat.registration.id).snap
+    assert live.id == snap_id and live.is_live
     services.desk.close_idle(0.0)
-    assert services.desk.live_snap(seat.registration.id) is None
+    assert services.desk.live_state(seat.registration.id) is None
     assert services.log.snap_events(snap_id)[-1].kind == "snap_cancelled"
 
 
