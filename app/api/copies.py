@@ -7,7 +7,8 @@ from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Identity
 from app.labeling.copying import Copy, copies_for
-from app.labeling.desk import NotFoundError, Seat
+from app.labeling.desk import NotFoundError
+from app.labeling.seat import Seat
 from app.labeling.tools import require
 from app.services import Services
 from app.tables import Pose

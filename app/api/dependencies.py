@@ -15,7 +15,7 @@ from starlette.requests import HTTPConnection
 
 from app.api.problems import InputError
 from app.auth import Identity, Role
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.services import Services
 from app.study.participation import sees
 from app.tables import Pose

@@ -12,7 +12,7 @@ from app.api.pointing import PixelPoint, ViewPoint, frame_of, points_of, target_
 from app.api.registration_state import RegistrationOut, registration_out
 from app.labeling import placement, viewpoint
 from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.labeling.track import ActionError
 from app.scene_data import SceneData
 from app.tables import Frame

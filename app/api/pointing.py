@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, FiniteFloat
 
 from app.api.problems import InputError
 from app.labeling import placement
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.labeling.track import ActionError
 from app.labeling.viewpoint import Viewpoint
 from app.scene_data import SceneData, camera_of

@@ -4,9 +4,9 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.desk import Seat
 from app.labeling.layers import Layers
-from app.labeling.session import SessionState
+from app.labeling.seat import Seat
+from app.labeling.session_state import SessionState
 from app.labeling.tools import Tool
 from app.tables import Pose
 from registration_core import pose

@@ -10,7 +10,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.api.dependencies import SeatDep, ServicesDep, identify
 from app.api.registration_state import registration_out
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 

@@ -27,6 +27,7 @@ from app.api.dependencies import (
 from app.auth import Identity
 from app.services import Services
 from app.tables import Frame, Pose, Scene, Task
+from registration_core.depth_agreement import TOLERANCE
 
 router = APIRouter(prefix="/api", tags=["scenes"])
 
@@ -53,6 +54,9 @@ class FrameOut(BaseModel):
     T_world_camera: Pose
     depth_scale: float
     """A raw depth value times this is millimetres."""
+    depth_tolerance: float
+    """Metres that depth may be off and still agree with a surface, up to a distance of 1 m; beyond, it grows
+    with the square of the distance."""
     color_url: str | None
     depth_url: str
     raw_depth_url: str
@@ -150,6 +154,7 @@ def _frame_out(row: Frame) -> dict[str, Any]:
         "intrinsics": Intrinsics(fx=row.fx, fy=row.fy, cx=row.cx, cy=row.cy),
         "T_world_camera": row.T_world_camera,
         "depth_scale": row.depth_scale,
+        "depth_tolerance": TOLERANCE,
         "color_url": f"/api/frames/{row.id}/color.png" if row.color_hash else None,
         "depth_url": f"/api/frames/{row.id}/depth.png",
         "raw_depth_url": f"/api/frames/{row.id}/depth.raw",

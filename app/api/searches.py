@@ -86,7 +86,9 @@ def request_search(seat: SeatDep, identity: AnyoneDep, body: NewSearch | None = 
 def get_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> SearchDetail:
     """How a search stands, with its candidates when it is done."""
     registration_id = _events(services, identity, search_id)[0].registration_id
-    live = services.desk.live_search(registration_id)  # before the log: how this one ended is there by now
+    # Before the log: how this one ended is there by now.
+    now = services.desk.live_state(registration_id)
+    live = now.search if now else None
     requested, *rest = _events(services, identity, search_id)
     outcome = rest[0] if rest else None
     detail = outcome.detail if outcome else {}

@@ -139,7 +139,9 @@ def request_snap(seat: SeatDep, identity: AnyoneDep, body: NewSnap | None = None
 def get_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDetail:
     """How a snap stands, with its estimate when it is done."""
     registration_id = _events(services, identity, snap_id)[0].registration_id
-    live = services.desk.live_snap(registration_id)  # before the log: how this one ended is there by now
+    # Before the log: how this one ended is there by now.
+    now = services.desk.live_state(registration_id)
+    live = now.snap if now else None
     outcome = next((event for event in services.log.snap_events(snap_id) if event.kind in OUTCOMES), None)
     if outcome is not None:
         estimate = services.log.estimate(snap_id)

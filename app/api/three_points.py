@@ -11,7 +11,7 @@ from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, target_of, viewpoint_of
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.scene_data import SceneData
 from registration_core.correspondence import Correspondence, pose_from_correspondences
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.labeling.depth_reading import DepthReading
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 from registration_core.depth_agreement import Verdict
 
 SECONDS_BETWEEN = 0.1

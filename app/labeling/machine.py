@@ -9,6 +9,7 @@ from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.history import Step
 from app.labeling.live_snap import LiveSnap
+from app.labeling.same_pose import SamePose
 from app.labeling.snap_exchange import (
     KnownObject,
     Offer,
@@ -32,9 +33,6 @@ it takes over at least nine are right, and the tenth costs the operator one key.
 
 LIVE_SEED = 0
 """Always the same, so that the ghost of an object that rests does so, too."""
-
-SamePose = Callable[[Array, Array], bool]
-"""Whether two poses T_world_object are one and the same, as far as anybody could tell."""
 
 
 class Machine:

@@ -12,7 +12,8 @@ from fastapi import APIRouter, Depends, Request, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from app.api.dependencies import Id, SeatDep, get_services, identify, is_same_origin
-from app.labeling.desk import NotFoundError, Seat
+from app.labeling.desk import NotFoundError
+from app.labeling.seat import Seat
 from app.services import Services
 
 router = APIRouter(include_in_schema=False)
@@ -20,6 +21,8 @@ router = APIRouter(include_in_schema=False)
 SUBPROTOCOL_PREFIX = "viser-v"
 REFUSED = 4403
 """Close code of a WebSocket that may not be opened."""
+SECONDS_BETWEEN_LOGIN_CHECKS = 2.0
+"""A view that is open closes no later than that after its login has ended."""
 
 
 @router.get("/view/{registration_id}/{path:path}")
@@ -78,7 +81,9 @@ async def _nobody_counts(_change: int) -> None:
 async def join(
     socket: WebSocket, port: int, count: Callable[[int], Awaitable[None]] = _nobody_counts
 ) -> None:
-    """Hand messages to and fro between a page and the view on a loopback port, until either leaves.
+    """Hand messages to and fro between a page and the view on a loopback port.
+
+    That goes on until either leaves, or the login that the page came with ends.
 
     Args:
         socket: Of the page, not accepted yet.
@@ -95,7 +100,8 @@ async def join(
     ) as view:
         await socket.accept(subprotocol=view.subprotocol)
         await count(+1)
-        tasks = {asyncio.create_task(_to_page(socket, view)), asyncio.create_task(_to_view(socket, view))}
+        ways = (_to_page(socket, view), _to_view(socket, view), _until_login_ends(socket))
+        tasks = {asyncio.create_task(way) for way in ways}
         try:
             _, unfinished = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -124,3 +130,8 @@ async def _to_view(socket: WebSocket, view: websockets.ClientConnection) -> None
     with contextlib.suppress(WebSocketDisconnect):
         while True:
             await view.send(await socket.receive_bytes())
+
+
+async def _until_login_ends(socket: WebSocket) -> None:
+    while await asyncio.to_thread(identify, socket) is not None:
+        await asyncio.sleep(SECONDS_BETWEEN_LOGIN_CHECKS)

@@ -1,12 +1,15 @@
 """Finding the object without a start: the search that was asked for, and how it stands."""
 
-from collections.abc import Callable
+import secrets
+import uuid
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.snap_exchange import KnownObject, SnapFailure, SnapStatus, stored_known
+from app.labeling.tools import Tool, require
 from app.labeling.track import Track
 from registration_core import Hypothesis, SnapConfig
 
@@ -54,18 +57,37 @@ class Search:
 
     Args:
         track: Where it is written down.
+        tools: What may be used on this task.
         request_search: Hands an order to the workers.
+        known_objects: Tells what is known of other objects in the scene.
     """
 
-    def __init__(self, track: Track, request_search: RequestSearch) -> None:
+    def __init__(
+        self,
+        track: Track,
+        tools: Collection[Tool],
+        request_search: RequestSearch,
+        known_objects: Callable[[], tuple[KnownObject, ...]],
+    ) -> None:
         self._track = track
+        self._tools = tools
         self._request_search = request_search
+        self._known_objects = known_objects
         self._cancel: Callable[[], None] | None = None
         self.status: SnapStatus | None = None
         """Of the last search; None once its candidates were taken or put away."""
 
-    def start(self, actor: Actor, order: SearchOrder) -> None:
-        """Look for the object; the newest search wins."""
+    def start(self, actor: Actor, region: Region | None, config: SnapConfig, seed: int | None) -> str:
+        """Look for the object; returns the search's id. See `LabelingSession.search`."""
+        require(self._tools, "find it")
+        order = SearchOrder(
+            search_id=uuid.uuid4().hex,
+            frame_id=self._track.frame_id,
+            region=region,
+            config=config,
+            seed=secrets.randbelow(2**31) if seed is None else seed,
+            known=self._known_objects(),
+        )
         self.abandon(actor, "superseded")
         detail = {
             "seed": order.seed,
@@ -81,6 +103,7 @@ class Search:
             lambda share: self._began(order),
             lambda outcome: self._ended(order, outcome),
         )
+        return order.search_id
 
     def abandon(self, actor: Actor, reason: str) -> None:
         """Stop the search that is under way; nothing happens where there is none."""

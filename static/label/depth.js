@@ -15,7 +15,7 @@ export function depthOf(frame) {
   return loaded.get(frame);
 }
 
-async function load({ raw_depth_url: url, width, height, depth_scale: scale, intrinsics }) {
+async function load({ raw_depth_url: url, width, height, depth_scale: scale, depth_tolerance: tolerance, intrinsics }) {
   const answer = await fetch(url);
   if (!answer.ok) throw new Error("The depth image could not be loaded; switch the agreement off and on to try again.");
   const { fx, fy, cx, cy } = intrinsics;
@@ -24,6 +24,7 @@ async function load({ raw_depth_url: url, width, height, depth_scale: scale, int
     width,
     height,
     metres: scale / 1000,
+    tolerance,
     sensor: [fx, fy, cx, cy],
     verdicts: VERDICTS.map((name) => colorOf(`--${name}`)),
   };

@@ -92,6 +92,7 @@ export function meshDrawing(canvas, { vertices, faces }) {
     gl.uniformMatrix4fv(shape.at("projection"), false, columns(projection(camera, width, height)));
     gl.uniform1i(shape.at("measured"), DEPTH_UNIT);
     gl.uniform1f(shape.at("unitOfDepth"), depth?.metres ?? 0);
+    gl.uniform1f(shape.at("tolerance"), depth?.tolerance ?? 0);
     gl.uniform4fv(shape.at("sensor"), depth?.sensor ?? [1, 1, 0, 0]);
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, buffers.sampled);

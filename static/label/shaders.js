@@ -13,22 +13,22 @@ void main() {
 
 // Red is how much light comes back to the camera from a flat face, alpha how much of the pixel is covered. Green and
 // blue are what the depth image says there: (0, 0) nothing, (1, 0) a match, (0, 1) and (1, 1) that the face is in
-// front of, or behind, what was measured. The limit is that of registration_core's depth_agreement.
+// front of, or behind, what was measured, as registration_core's depth_agreement judges it.
 export const SHAPE_FRAGMENT = `#version 300 es
 precision highp float;
 uniform highp usampler2D measured;
 uniform vec4 sensor;
 uniform float unitOfDepth;
+uniform float tolerance;
 in vec3 place;
 out vec4 painted;
-const float TOLERANCE = 0.005;
 vec2 verdict() {
   ivec2 pixel = ivec2(floor(sensor.xy * place.xy / place.z + sensor.zw + 0.5));
   ivec2 size = textureSize(measured, 0);
   if (any(lessThan(pixel, ivec2(0))) || any(greaterThanEqual(pixel, size))) return vec2(0.0);
   float depth = unitOfDepth * float(texelFetch(measured, pixel, 0).r);
   if (depth == 0.0) return vec2(0.0);
-  float most = TOLERANCE * pow(max(place.z, 1.0), 2.0);
+  float most = tolerance * pow(max(place.z, 1.0), 2.0);
   if (depth - place.z > most) return vec2(0.0, 1.0);
   return place.z - depth > most ? vec2(1.0, 1.0) : vec2(1.0, 0.0);
 }

@@ -10,7 +10,7 @@ import uvicorn
 
 from app.api.dependencies import SESSION_COOKIE
 from app.auth import Role
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.main import create_app
 from app.services import Services
 from tests.app.waiting import LONGEST, wait_until

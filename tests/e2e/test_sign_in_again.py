@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import wait_for_picture
+from tests.e2e.gizmo import expect_new_view, view_frame
 from tests.e2e.test_labelling import Desk
 from tests.processes import Server, run_snap6d
 
@@ -18,7 +18,11 @@ PASSWORD = "correct horse battery"
 
 
 def end_login(desk: Desk) -> None:
-    """The cookie stays with the browser, as it does when a login expires; the server knows it no more."""
+    """The cookie stays with the browser, as it does when a login expires; the server knows it no more.
+
+    The 3-D view loses its connection with it, and gets another one once somebody is signed in again.
+    """
+    expect_new_view(desk.frame)
     cookies = desk.page.context.cookies()
     assert desk.page.request.post(f"{desk.root}/api/sign-out").ok
     desk.page.context.add_cookies(cookies)
@@ -60,6 +64,7 @@ def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Calla
     page.bring_to_front()
     dialog.get_by_role("button", name="I have signed in there").click()
     expect(dialog).to_be_hidden()
+    desk.frame = view_frame(page)
     desk.events("undo")  # what was asked for when the login had ended
     assert np.allclose(desk.pose, start)
 
@@ -70,7 +75,7 @@ def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Calla
     page.keyboard.press("Enter")
     expect(dialog).to_be_hidden()
     desk.events("redo")
-    wait_for_picture(desk.frame)
+    desk.frame = view_frame(page)
     desk.drag("tz", 0.02)
 
 

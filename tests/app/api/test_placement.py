@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from registration_core import pose
 from tests.app.export.site import CAMERA, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import CAMERA as VISER_CAMERA

@@ -46,12 +46,15 @@ def test_pictures_are_the_bytes_that_were_imported(
             )
 
 
-def test_depth_is_16_bit_and_in_millimetres_when_scaled(scenes: list[dict], operator: httpx.Client) -> None:
+def test_depth_is_16_bit_in_millimetres_when_scaled_and_judged_in_metres(
+    scenes: list[dict], operator: httpx.Client
+) -> None:
     frame = scenes[0]["frames"][0]
     with Image.open(io.BytesIO(operator.get(frame["depth_url"]).content)) as image:
         assert image.mode.startswith("I;16")
         raw = np.asarray(image)
     assert 300 < np.median(raw[raw > 0]) * frame["depth_scale"] < 1000
+    assert frame["depth_tolerance"] == 0.005
 
 
 def test_raw_depth_is_the_picture_for_those_who_cannot_read_16_bit(

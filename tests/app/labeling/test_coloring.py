@@ -9,11 +9,11 @@ import pytest
 from app.labeling.coloring import COLORS, MOST_POINTS, Coloring
 from app.labeling.depth_reading import DepthReading
 from app.labeling.layers import Layers
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 from registration_core import pose
 from registration_core.depth_agreement import Verdict
+from tests.app.labeling.bench import Bench
 from tests.app.labeling.test_depth_reading import MODEL, T_CAMERA_OBJECT, T_WORLD_CAMERAS, Frames
-from tests.app.labeling.test_session import Bench
 from tests.app.waiting import wait_until
 
 TRUE = T_WORLD_CAMERAS[3] @ T_CAMERA_OBJECT

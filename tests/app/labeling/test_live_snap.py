@@ -8,11 +8,11 @@ import pytest
 
 from app.auth import Actor
 from app.labeling.machine import LIVE_SEED
-from app.labeling.session import SessionState
+from app.labeling.session_state import SessionState
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.labeling.track import ActionError
 from registration_core import SnapConfig
-from tests.app.labeling.test_session import FRAMES, START, Bench, RequestedSnap, result, shifted
+from tests.app.labeling.bench import FRAMES, START, Bench, RequestedSnap, result, shifted
 from tests.app.waiting import LONGEST
 
 
@@ -131,17 +131,17 @@ def test_a_look_that_fails_shows_nothing_and_is_not_tried_again_from_there(live)
 
 
 def test_a_look_that_fails_at_once_is_survived():
-    bench = Bench()
+    orders = []
 
     def refuse(order, on_progress, on_end):
-        bench.workers.snaps.append(RequestedSnap(order, on_progress, on_end))
+        orders.append(order)
         on_end(SnapFailure("out of view"))
         return lambda: None
 
-    bench.session._request_snap = refuse
+    bench = Bench(request_snap=refuse)
     bench.session.set_live(True, Actor.HUMAN)
     bench.drag(shifted(0.1), shifted(0.2))
-    assert len(bench.workers.snaps) == 3
+    assert len(orders) == 3
     assert bench.state.live is None
 
 
@@ -270,8 +270,8 @@ class BusyWorkers:
 
 
 def test_the_last_pose_of_a_drag_is_looked_at_whatever_the_threads_do():
-    bench, workers = Bench(), BusyWorkers()
-    bench.session._request_snap = workers
+    workers = BusyWorkers()
+    bench = Bench(request_snap=workers)
     arrived = threading.Event()
     last = shifted(0.2)
 

@@ -7,14 +7,9 @@ from app.auth import Actor
 from app.labeling.machine import TAKE_OVER_CONFIDENCE
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
-from tests.app.labeling.test_session import START, Bench, result, shifted
+from tests.app.labeling.bench import START, Bench, result, shifted
 
 SURE, UNSURE = TAKE_OVER_CONFIDENCE, TAKE_OVER_CONFIDENCE - 0.01
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
 
 
 @pytest.fixture

@@ -1,29 +1,17 @@
 """What is done of a scene beside the thing that is worked on: told, shown, and known to snaps."""
 
 import numpy as np
-import pytest
 
 from app.auth import Actor, Identity, Role
-from app.labeling.desk import Seat
+from app.labeling.seat import Seat
 from app.scene_data import camera_of
 from app.services import Services
 from app.tables import Task
 from registration_core import SnapConfig, explained_pixels, pose, propose
-from tests.app.labeling.test_desk import sign_up, wait_for_snap
+from tests.app.labeling.seats import sign_up, wait_for_snap
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.small_dataset import BLOCK, TOOL, true_pose
 from tests.app.waiting import wait_until
-
-
-@pytest.fixture
-def ann(services: Services) -> Identity:
-    return sign_up(services, "ann")
-
-
-@pytest.fixture
-def seat(services: Services, ann: Identity) -> Seat:
-    """Ann before the first task: the angle tool of scene 1, where there is a block, too."""
-    return services.desk.start(1, ann)
 
 
 def submitted(services: Services, task_id: int, user: Identity, T_world_object: np.ndarray) -> Seat:

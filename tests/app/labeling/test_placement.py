@@ -137,6 +137,8 @@ def first_hit(model: ObjectModel, T: np.ndarray, eye: np.ndarray, point: np.ndar
     corners = pose.apply(T, model.vertices)[model.faces]
     ray = (point - eye) / np.linalg.norm(point - eye)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    faced = normals @ ray != 0  # the ray never meets a face that it runs along
+    corners, normals = corners[faced], normals[faced]
     along = np.einsum("fi,fi->f", normals, corners[:, 0] - eye) / (normals @ ray)
     inside = np.all(
         [

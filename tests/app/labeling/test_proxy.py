@@ -9,6 +9,7 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from app.api.dependencies import SESSION_COOKIE
+from app.labeling import proxy
 from registration_core import pose
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.live import LiveServer
@@ -98,6 +99,25 @@ def test_after_signing_out_the_door_is_closed(live):
     assert carl.http.post("/api/sign-out").status_code == 204
     url = f"ws://{live.host}/view/{carl.id}/"
     assert refused(lambda: ViserClient(url, cookie, live.url)) == 403
+
+
+def test_signing_out_closes_the_views_of_that_login_and_no_others(live, ann, monkeypatch):
+    monkeypatch.setattr(proxy, "SECONDS_BETWEEN_LOGIN_CHECKS", 0.05)
+    ida = Operator(live, "ida of the proxy")
+    elsewhere = {"cookie": f"{SESSION_COOKIE}={live.login('ida of the proxy')}"}
+    url = f"ws://{live.host}/view/{ida.id}/"
+    with ida.view() as left, ViserClient(url, elsewhere, live.url) as kept, ann.view() as hers:
+        left.node("MeshMessage", "/object/mesh")
+        seat = live.seat(ida.id)
+        wait_until(lambda: seat.viewers == 2, "both of her views to be open")
+        assert ida.http.post("/api/sign-out").status_code == 204
+        with pytest.raises(ConnectionClosed):
+            left.wait_for("NoSuchMessage")
+        wait_until(lambda: seat.viewers == 1, "the view to be left")
+        kept.drag([np.array(ida.registration["T_world_object"]) @ ida.T_object_gizmo @ pose.exp([0.01] * 6)])
+        wait_until(lambda: seat.session.snapshot().can_undo, "the drag in the other view")
+        hers.node("MeshMessage", "/object/mesh")
+        assert live.seat(ann.id).viewers == 1
 
 
 @pytest.mark.parametrize(

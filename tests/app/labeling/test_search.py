@@ -8,16 +8,11 @@ from app.labeling.search import SearchResult
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
 from registration_core import Hypothesis, SnapConfig
-from tests.app.labeling.test_session import FRAMES, START, Bench, result, shifted
+from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted
 
 FOUND = SearchResult(
     (Hypothesis(START, 0.75), Hypothesis(shifted(0.1), 0.25)), 0.2, "1.2.3", "a test machine"
 )
-
-
-@pytest.fixture
-def bench() -> Bench:
-    return Bench()
 
 
 def test_a_search_is_recorded_with_all_that_repeats_it_and_moves_nothing(bench):

@@ -9,7 +9,7 @@ from app.auth import Actor
 from app.labeling.layers import Layers
 from app.labeling.tools import ALL, COMPARED, MACHINES, require, tools_of
 from app.labeling.track import ActionError
-from tests.app.labeling.test_session import START, Bench, result
+from tests.app.labeling.bench import START, Bench, result
 
 T_ELSEWHERE = START + np.eye(4, k=3)
 

@@ -1,0 +1,123 @@
+"""Turns the orders of one session into jobs for the workers, and what they bring into poses in the world."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import __version__
+from app.labeling.neighbours import Neighbours
+from app.labeling.search import SearchOrder, SearchResult
+from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
+from app.scene_data import SceneData, camera_of
+from app.snapping import SnapError, Snapper
+from app.tables import Frame
+from app.worker import JobResult, Proposals, SearchJob, SnapJob
+from registration_core import ObjectModel, pose
+from registration_core.problem import region_of_interest
+
+LIVE_PRIORITY = -1
+"""Where workers have to choose, they do what somebody waits for first."""
+
+
+class Dispatch:
+    """`snap` and `search` are what a session is handed as `RequestSnap` and `RequestSearch`.
+
+    Args:
+        snapper: Runs jobs.
+        data: Where depth comes from.
+        frames: The scene's frames, by id.
+        model: What is looked for.
+        neighbours: Tells which pixels other objects explain.
+    """
+
+    def __init__(
+        self,
+        snapper: Snapper,
+        data: SceneData,
+        frames: Mapping[int, Frame],
+        model: ObjectModel,
+        neighbours: Neighbours,
+    ) -> None:
+        self._snapper = snapper
+        self._data = data
+        self._frames = frames
+        self._model = model
+        self._neighbours = neighbours
+
+    def snap(
+        self,
+        order: SnapOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SnapResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        """Let a worker look for a better pose; returns a function that cancels it."""
+        T_world_camera = np.array(self._frames[order.frame_id].T_world_camera)
+
+        def ended(outcome: JobResult | SnapError) -> None:
+            if isinstance(outcome, SnapError):
+                on_end(SnapFailure(str(outcome)))
+                return
+            T_world_object = T_world_camera @ outcome.estimate.T_camera_object
+            on_end(SnapResult(outcome.estimate, T_world_object, __version__, outcome.hardware))
+
+        try:
+            job = self._snap_job(order, pose.inverse(T_world_camera) @ order.T_world_object)
+        except ValueError as error:
+            on_end(SnapFailure(f"The snap cannot work on this: {error}."))
+            return lambda: None
+        priority = LIVE_PRIORITY if order.is_live else 0
+        return self._snapper.request(job, self._model, on_progress, ended, priority)
+
+    def search(
+        self,
+        order: SearchOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SearchResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        """Let a worker look where the object may be; returns a function that cancels it."""
+
+        def ended(outcome: Proposals | SnapError) -> None:
+            if isinstance(outcome, SnapError):
+                on_end(SnapFailure(str(outcome)))
+            else:
+                on_end(SearchResult(outcome.hypotheses, outcome.seconds, __version__, outcome.hardware))
+
+        return self._snapper.request(self._search_job(order), self._model, on_progress, ended)
+
+    def _snap_job(self, order: SnapOrder, T_camera_object: NDArray[np.float64]) -> SnapJob:
+        frame = self._frames[order.frame_id]
+        explained = self._neighbours.explained(frame, order.known)
+        camera = camera_of(frame)
+        whole = self._data.depth(frame)
+        left, top, width, height = region_of_interest(self._model, camera, T_camera_object, order.config)
+        if not whole[top : top + height, left : left + width].any():
+            left, top, (height, width) = 0, 0, whole.shape  # nothing near is no error, nothing seen at all is
+        rows, columns = slice(top, top + height), slice(left, left + width)
+        return SnapJob(
+            snap_id=order.snap_id,
+            topic="" if order.is_live else self._snapper.topic,
+            model_hash=self._model.content_hash,
+            depth=np.ascontiguousarray(whole[rows, columns]),
+            camera=camera.cropped(left, top, width, height),
+            explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
+            T_camera_object=T_camera_object,
+            config=order.config,
+            seed=order.seed,
+            start_spread=order.start_spread,
+        )
+
+    def _search_job(self, order: SearchOrder) -> SearchJob:
+        frame = self._frames[order.frame_id]
+        explained = self._neighbours.explained(frame, order.known)
+        depth = self._data.depth(frame)
+        return SearchJob(
+            snap_id=order.search_id,
+            topic=self._snapper.topic,
+            model_hash=self._model.content_hash,
+            depth=depth if explained is None else np.where(explained, 0.0, depth),
+            camera=camera_of(frame),
+            config=order.config,
+            seed=order.seed,
+            region=order.region,
+        )

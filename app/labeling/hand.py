@@ -1,0 +1,77 @@
+"""The operator's hand on the object: drags, poses that are set, and the way back and forth."""
+
+from collections.abc import Callable, Mapping
+
+from app.auth import Actor
+from app.event_log import NewEvent
+from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
+from app.labeling.drag import Drag
+from app.labeling.history import Step
+from app.labeling.track import ActionError, Array, Track
+
+
+class Hand:
+    """One at a time, as with the machine's hand: the session that owns it lets nobody else in.
+
+    Args:
+        track: The object's way.
+        now: Tells the seconds that the paths of drags are written down with.
+    """
+
+    def __init__(self, track: Track, now: Callable[[], float]) -> None:
+        self._track = track
+        self._now = now
+        self.axes: GizmoAxes = "object"
+        """Along which the gizmo's arrows lie."""
+
+    def take(self) -> None:
+        """Take hold of the gizmo."""
+        self._track.drag = Drag(self._track.history.current.T_world_object, self.axes, self._now)
+
+    def let_go(self) -> bool:
+        """Write the drag down; where that fails, it is taken back and said so.
+
+        Returns:
+            Whether it moved anything.
+        """
+        track = self._track
+        drag, track.drag = track.drag, None
+        event = None if drag is None else drag.event(track.pivot)
+        if drag is None or event is None:
+            return False
+        try:
+            track.push(event, Step(drag.T_now, dragged=True))
+        except Exception as error:
+            track.message = f"The last drag could not be saved and was taken back: {error}"
+            raise
+        return True
+
+    def put(self, T_world_object: Array, actor: Actor, detail: Mapping[str, object]) -> None:
+        """Put the object at a pose."""
+        before = self._track.history.current.T_world_object
+        event = NewEvent(
+            kind="set_pose",
+            actor=actor,
+            T_before=before.tolist(),
+            T_after=T_world_object.tolist(),
+            dof=degrees_of_freedom(before, T_world_object, self._track.pivot),
+            detail=dict(detail),
+        )
+        self._track.push(event, Step(T_world_object))
+
+    def reset(self, actor: Actor) -> None:
+        """Put the object back to where it began."""
+        start = self._track.history.steps[0]
+        self._track.push(self._track.move_event("reset", actor, start), start)
+
+    def undo(self, actor: Actor) -> None:
+        """Take the last change of pose back."""
+        if not self._track.history.can_undo:
+            raise ActionError("There is nothing to undo.")
+        self._track.go_to(self._track.history.undone(), "undo", actor)
+
+    def redo(self, actor: Actor) -> None:
+        """Bring back what was undone last."""
+        if not self._track.history.can_redo:
+            raise ActionError("There is nothing to redo.")
+        self._track.go_to(self._track.history.redone(), "redo", actor)

@@ -1,0 +1,159 @@
+"""A labelling session between a log and workers that the test holds in its hands."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app.event_log import NewEvent
+from app.labeling.history import History, Step
+from app.labeling.search import SearchOrder, SearchResult
+from app.labeling.session import LabelingSession
+from app.labeling.session_state import SessionState
+from app.labeling.snap_exchange import RequestSnap, SnapFailure, SnapOrder, SnapResult
+from app.tables import Condition, EstimateRow
+from registration_core import Ambiguity, Estimate, Hypothesis, pose
+
+START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
+FRAMES = (11, 12)
+PIVOT = np.array([0.02, -0.01, 0.03])
+
+
+def shifted(amount: float, axis: int = 0) -> np.ndarray:
+    twist = np.zeros(6)
+    twist[axis] = amount
+    return START @ pose.exp(twist)
+
+
+class Log:
+    """Keeps what is recorded; or breaks."""
+
+    def __init__(self) -> None:
+        self.events: list[NewEvent] = []
+        self.estimates: list[EstimateRow] = []
+        self.broken = False
+        self.watch: Callable[[], object] = lambda: None
+
+    def __call__(self, event: NewEvent, estimate: EstimateRow | None = None) -> None:
+        self.watch()
+        if self.broken:
+            raise OSError("no space left")
+        self.events.append(event)
+        if estimate is not None:
+            self.estimates.append(estimate)
+
+    @property
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+
+@dataclass
+class RequestedSnap:
+    """A snap that a session asked for, moved on by hand."""
+
+    order: SnapOrder
+    progress: Callable[[float], None]
+    end: Callable[[SnapResult | SnapFailure], None]
+    cancelled: bool = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+@dataclass
+class Workers:
+    """Takes orders and does nothing by itself."""
+
+    snaps: list[RequestedSnap] = field(default_factory=list)
+
+    def __call__(
+        self,
+        order: SnapOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SnapResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        self.snaps.append(RequestedSnap(order, on_progress, on_end))
+        return self.snaps[-1].cancel
+
+
+@dataclass
+class RequestedSearch:
+    """A search that a session asked for, moved on by hand."""
+
+    order: SearchOrder
+    progress: Callable[[float], None]
+    end: Callable[[SearchResult | SnapFailure], None]
+    cancelled: bool = False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+@dataclass
+class Searchers:
+    """Takes searches and does nothing by itself."""
+
+    searches: list[RequestedSearch] = field(default_factory=list)
+
+    def __call__(
+        self,
+        order: SearchOrder,
+        on_progress: Callable[[float], None],
+        on_end: Callable[[SearchResult | SnapFailure], None],
+    ) -> Callable[[], None]:
+        self.searches.append(RequestedSearch(order, on_progress, on_end))
+        return self.searches[-1].cancel
+
+
+def result(T: np.ndarray, confidence: float = 0.9) -> SnapResult:
+    estimate = Estimate(
+        T_camera_object=T,
+        confidence=confidence,
+        covariance=np.eye(6) * 1e-6,
+        hypotheses=(Hypothesis(T, 0.7), Hypothesis(START, 0.3)),
+        seconds=0.25,
+        evaluations=1234,
+        converged=True,
+        ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
+        seed=5,
+    )
+    return SnapResult(estimate, T, "1.2.3", "a test machine")
+
+
+class Bench:
+    """A session between a log and workers."""
+
+    def __init__(
+        self,
+        state: str = "open",
+        condition: Condition = "snap",
+        in_study: bool = False,
+        request_snap: RequestSnap | None = None,
+    ) -> None:
+        self.log = Log()
+        self.workers = Workers()
+        self.searchers = Searchers()
+        self.session = LabelingSession(
+            registration_id=7,
+            history=History((Step(START),)),
+            state=state,
+            frame_id=FRAMES[0],
+            frame_ids=FRAMES,
+            pivot=PIVOT,
+            condition=condition,
+            same_pose=lambda a, b: bool(np.allclose(a, b, atol=0.005)),
+            record_event=self.log,
+            request_snap=request_snap or self.workers,
+            request_search=self.searchers,
+            in_study=in_study,
+        )
+
+    @property
+    def state(self) -> SessionState:
+        return self.session.snapshot()
+
+    def drag(self, *way: np.ndarray) -> None:
+        self.session.start_drag()
+        for T in way:
+            self.session.drag_to(T)
+        self.session.end_drag()
