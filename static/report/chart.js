@@ -146,6 +146,6 @@ function axes(scales, error) {
     ...scales.margins.map((margin) => text({ x: scales.x(margin), y: BOX.bottom + 16, "text-anchor": "middle" }, margin)),
     text({ x: (BOX.left + BOX.right) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, `error margin [${unitOf(error)}]`),
     text({ x: 12, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(-90 12 ${HEIGHT / 2 - 16})` }, "seconds"),
-    text({ x: WIDTH - 6, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(90 ${WIDTH - 6} ${HEIGHT / 2 - 16})` }, "share remaining"),
+    text({ x: WIDTH - 11, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(90 ${WIDTH - 11} ${HEIGHT / 2 - 16})` }, "share remaining"),
   ];
 }

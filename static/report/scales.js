@@ -3,7 +3,7 @@
 export const WIDTH = 560;
 export const HEIGHT = 300;
 const LEFT = 46;
-const RIGHT = 48;
+const RIGHT = 54;
 const TOP = 12;
 const BOTTOM = 44;
 

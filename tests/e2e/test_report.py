@@ -28,7 +28,7 @@ def log_of(seconds_a_move: float, end: float) -> list[Entry]:
 
 @pytest.fixture(scope="module")
 def study(server: Server) -> int:
-    """Four novices and four experts, quick and accurate, with snaps from every second sample."""
+    """Four novices and four experts, quick and accurate, with snaps; the novices search, too."""
     database = Database(Settings(state_dir=server.state_dir).resolved_database_url)
     rng = np.random.default_rng(4)
     made = HandMadeStudy(database, "mugs by hand", groups={"novice": 4, "expert": 4, "child": 2})
@@ -45,6 +45,8 @@ def study(server: Server) -> int:
                     float(t): at(0.0015 + 0.03 / t**2, rng.uniform(0.01, 0.02 + 0.4 / t)) for t in samples
                 }
                 made.snaps(registration, snaps)
+            if group == "novice":
+                made.trial(participant, log_of(0.5, 0.002), mode="quick", condition="find it")
     late = [*log_of(1.0, 0.0)[:-1], moved(9.0, "submit", at(0.0), late=99.0)]
     made.trial(made.participant("L1", "novice"), late)
     database.close()
@@ -66,7 +68,7 @@ def page(server: Server, study: int, open_page: Callable[[str], Page]) -> Page:
 
 def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
     expect(page.locator("#simulated")).to_be_visible()
-    expect(page.locator("#about")).to_contain_text("17 trials")
+    expect(page.locator("#about")).to_contain_text("21 trials")
     expect(page.locator("#sections")).to_contain_text("the clock was put forward by 99 s")
     expect(page.locator("#sections")).to_contain_text("group child: has no operators")
     take_picture(page, "report")
@@ -106,9 +108,17 @@ def test_the_numbers_are_there_as_a_table_and_as_files(page: Page) -> None:
     table = page.locator("section", has_text="The curves as a table")
     table.get_by_text("Show the table").click()
     assert table.locator("tbody tr").count() == 8 * 2 * 41
+    pairs = page.locator("section", has_text="Conditions in pairs").locator("tbody tr")
+    expect(pairs).to_have_count(2)  # of novices, and of everybody
+    expect(pairs.first).to_contain_text("novicequickfind it − manual44")
+    pairs.first.scroll_into_view_if_needed()
+    take_picture(page, "report-pairs")
     with page.expect_download() as download:
         page.get_by_role("link", name="Figure (PDF)").click()
     assert download.value.suggested_filename.endswith("figure.pdf")
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Report (HTML)").click()
+    assert "find it − manual" in download.value.path().read_text()  # though the page shows `manual`
 
 
 def test_the_team_s_page_tells_of_ordinary_work(page: Page, server: Server) -> None:
