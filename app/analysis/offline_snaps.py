@@ -16,8 +16,8 @@ from app.tables import OfflineSnap, Participant, Registration
 
 Array = NDArray[np.float64]
 
-SECOND_DIGITS = 6
-"""Decimals to which the time of a sample and that of its snap agree."""
+TICKS = 1e6
+"""Of a second, to which the time of a sample and that of its snap agree."""
 ABOUT = "offline snaps"
 
 
@@ -30,8 +30,8 @@ class StoredSnap(NamedTuple):
     """Of Snap6D, that computed it."""
 
 
-SnapsBySecond = dict[float, StoredSnap]
-"""Of a registration, by the second of the trace, rounded."""
+SnapsBySecond = dict[int, StoredSnap]
+"""Of a registration, by the second of the trace, in ticks."""
 
 
 class SnapsAt(NamedTuple):
@@ -61,13 +61,13 @@ def snaps_of(session: Session, study_id: int) -> dict[int, SnapsBySecond]:
     )
     snaps: dict[int, SnapsBySecond] = defaultdict(dict)
     for registration_id, seconds, text, version in session.execute(query):
-        snaps[registration_id][_key(seconds)] = StoredSnap(decoded_pose(text), version)
+        snaps[registration_id][round(TICKS * seconds)] = StoredSnap(decoded_pose(text), version)
     return snaps
 
 
 def snaps_at(times: Array, snaps: SnapsBySecond) -> SnapsAt:
     """The snaps of a registration from its samples at times (M,) of the trace."""
-    stored = [snaps.get(_key(second)) for second in times.tolist()]
+    stored = [snaps.get(tick) for tick in np.rint(TICKS * times).astype(np.int64).tolist()]
     found = [(i, T) for i, one in enumerate(stored) if one is not None and (T := one[0]) is not None]
     T_world_object = np.array([T for _, T in found]).reshape(-1, 4, 4)
     return SnapsAt([i for i, _ in found], T_world_object, stored.count(None))
@@ -95,7 +95,3 @@ def about_snaps(trials: Sequence[TrialTrace], snaps: Mapping[int, SnapsBySecond]
     if len(versions) > 1:
         text = f"they are of several versions of Snap6D, {', '.join(versions)}, and are shown as one"
         yield Remark(ABOUT, text)
-
-
-def _key(seconds: float) -> float:
-    return round(seconds, SECOND_DIGITS)
