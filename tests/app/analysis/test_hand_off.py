@@ -34,6 +34,16 @@ def test_much_that_is_saved_by_one_alone_hides_nothing_that_is_sure():
     assert point is not None and (point.margin, point.best_margin) == (0.05, 0.02)
 
 
+def test_margins_that_few_reach_do_not_count():
+    few = [NAN] * 3
+    human = np.array(
+        [[2.1] * 5, [3.1, 3.2, 3.3, 3.4, 3.5], [9.1, 0.0, *few], [99.1, 99.2, *few]]
+    ).T  # at 0.02 one of two loses time
+    point = hand_off(human, np.full((5, 4), 0.1), ["P1", "P2", "P3", "P4", "P5"], MARGINS, seed=0)
+    assert point is not None
+    assert (point.margin, point.best_margin, point.operators) == (0.1, 0.05, 5)
+
+
 def test_only_trials_that_come_there_both_ways_are_compared():
     human = np.array([[9.0, 9.0, NAN, NAN], [9.0, 9.0, 9.0, NAN]])
     point = hand_off(human, np.where(np.isnan(human), STG, NAN), OPERATORS, MARGINS, seed=0)
