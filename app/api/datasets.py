@@ -24,8 +24,8 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.problems import InputError
+from app.archives import import_archive
 from app.auth import Identity
-from app.importing import import_archive
 from app.services import Services
 from app.tables import OUTSIDE_STUDIES, Dataset, Object, Registration, Scene, Task
 
