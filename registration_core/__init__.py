@@ -1,5 +1,6 @@
 """Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
 
+from registration_core.acceptance import NEVER, Calibration, acceptance, calibration_of
 from registration_core.camera import Intrinsics
 from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
@@ -15,7 +16,9 @@ from registration_core.symmetry_search import find_symmetries
 from registration_core.views import snap_views
 
 __all__ = [
+    "NEVER",
     "Ambiguity",
+    "Calibration",
     "Correspondence",
     "Estimate",
     "Hypothesis",
@@ -26,7 +29,9 @@ __all__ = [
     "SuggestedSymmetry",
     "Symmetries",
     "WorldEstimate",
+    "acceptance",
     "as_symmetries",
+    "calibration_of",
     "explained_pixels",
     "find_symmetries",
     "pose_from_correspondences",
