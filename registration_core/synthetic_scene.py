@@ -12,7 +12,8 @@ from registration_core.camera import Intrinsics, project
 from registration_core.object_model import ObjectModel
 from registration_core.procedural_objects import ProceduralObject, random_distractor
 from registration_core.rasterizer import render_depth
-from registration_core.sensor_model import SensorModel, sensed
+from registration_core.sensor_families import DEMO, SensorFamily, draw_sensor
+from registration_core.sensor_model import measure
 from registration_core.tabletop import Layout, Placed, cameras_around, place
 
 Array = NDArray[np.float64]
@@ -24,7 +25,7 @@ CAMERA = Intrinsics(width=640, height=480, fx=570.0, fy=570.0, cx=319.5, cy=239.
 TABLE_SIZE, TABLE_THICKNESS = 1.2, 0.04
 """Metres."""
 
-LAYOUT, SENSOR = Layout(), SensorModel()
+LAYOUT = Layout()
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +71,7 @@ def make_scene(
     views: int = 1,
     camera: Intrinsics = CAMERA,
     layout: Layout = LAYOUT,
-    sensor: SensorModel = SENSOR,
+    family: SensorFamily = DEMO,
 ) -> Scene:
     """Put the objects and some unknown things on a table at random, and look at them from several sides.
 
@@ -81,7 +82,7 @@ def make_scene(
         views: number of cameras around the table.
         camera: of every view.
         layout: how crowded the table is, and where the cameras stand.
-        sensor: how good the depth is.
+        family: the kind of sensor; what it does wrong is drawn anew for each view.
     """
     unknown = [random_distractor(rng) for _ in range(distractors)]
     order = rng.permutation(len(objects) + distractors)  # the middle is not for the objects alone
@@ -93,7 +94,7 @@ def make_scene(
         tuple(known),
         tuple((thing, where.T_world_object) for thing, where in zip(unknown, others, strict=True)),
         tuple(
-            make_view(rng, known, others, camera, T_world_camera, sensor)
+            make_view(rng, known, others, camera, T_world_camera, family)
             for T_world_camera in cameras_around(views, rng, layout)
         ),
     )
@@ -105,7 +106,7 @@ def make_view(
     others: Sequence[Placed],
     camera: Intrinsics,
     T_world_camera: Array,
-    sensor: SensorModel,
+    family: SensorFamily,
 ) -> View:
     """Depth of everything on the table and, for each object, how much of it shows."""
     T_camera_world = pose.inverse(T_world_camera)
@@ -119,7 +120,8 @@ def make_view(
         for thing, silhouette in zip(objects, silhouettes[: len(objects)], strict=True)
     )
     perfect = np.where(np.isfinite(nearest), nearest, np.float32(0.0))
-    return View(camera, T_world_camera, perfect, sensed(perfect, camera, rng, sensor), instances)
+    measured = measure(perfect, camera, rng, draw_sensor(family, rng))
+    return View(camera, T_world_camera, perfect, measured, instances)
 
 
 @dataclass(frozen=True, eq=False)

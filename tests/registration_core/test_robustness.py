@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from registration_core import Intrinsics, ObjectModel, pose, pose_error, snap
 from registration_core.procedural_objects import demo_objects
 from registration_core.rasterizer import render_depth
-from registration_core.sensor_model import at_edges, sensed
+from registration_core.sensor_families import DEMO, draw_sensor
+from registration_core.sensor_model import at_edges, measure
 from registration_core.synthetic_scene import table_model
 from tests.registration_core.simple_scene import SimpleScene, nearest, noisy, tool
 
@@ -91,7 +92,7 @@ def flying(scene: SimpleScene, rng: np.random.Generator) -> Depth:
 
 
 def structured_light(scene: SimpleScene, rng: np.random.Generator) -> Depth:
-    return sensed(scene.depth, scene.camera, rng)
+    return measure(scene.depth, scene.camera, rng, draw_sensor(DEMO, rng))
 
 
 def no_background(scene: SimpleScene, rng: np.random.Generator) -> Depth:

@@ -1,52 +1,50 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from registration_core.camera import Intrinsics
-from registration_core.sensor_model import SensorModel, at_edges, facing, quantised, sensed
+from registration_core.sensor_model import (
+    Sensor,
+    at_edges,
+    blended,
+    facing,
+    field,
+    in_shadow,
+    measure,
+    quantised,
+)
 
 CAMERA = Intrinsics(width=160, height=120, fx=150.0, fy=150.0, cx=79.5, cy=59.5)
-CALM = SensorModel(
-    noise=0.0,
-    smooth_noise=0.0,
-    step=1e-7,
-    jitter=0.0,
-    edge_holes=0.0,
-    grazing=1e-9,
-    speckle_holes=0.0,
-    blobs=0,
-)
-"""A sensor that does nothing: each test switches one effect on."""
 
 
 def wall(z: float) -> np.ndarray:
     return np.full((CAMERA.height, CAMERA.width), z, dtype=np.float32)
 
 
-def measure(depth: np.ndarray, **effects: float) -> np.ndarray:
-    return sensed(depth, CAMERA, np.random.default_rng(0), replace(CALM, **effects))
+def measured(depth: np.ndarray, **errors: float | tuple[float, float]) -> np.ndarray:
+    """By a sensor that has these errors alone."""
+    return measure(depth, CAMERA, np.random.default_rng(0), Sensor(**errors))
+
+
+def step(near: float, far: float) -> np.ndarray:
+    """A wall whose right half is further away."""
+    depth = wall(near)
+    depth[:, 80:] = far
+    return depth
 
 
 def test_a_sensor_without_faults_returns_the_truth():
-    assert measure(wall(1.3)) == pytest.approx(1.3, abs=1e-5)
+    assert np.array_equal(measured(step(1.0, 1.3)), step(1.0, 1.3))
 
 
-def test_the_same_generator_gives_the_same_image():
-    images = [sensed(wall(1.0), CAMERA, np.random.default_rng(5)) for _ in range(2)]
-    assert np.array_equal(*images)
-    assert images[0].dtype == np.float32
-
-
-@pytest.mark.parametrize("effect", ["noise", "smooth_noise"])
+@pytest.mark.parametrize("effect", ["noise", "waves"])
 def test_noise_grows_with_distance_squared(effect):
-    spread = [float(np.std(measure(wall(z), **{effect: 0.002}) - z)) for z in (0.5, 1.0, 2.0)]
+    spread = [float(np.std(measured(wall(z), **{effect: 0.002}) - z)) for z in (0.5, 1.0, 2.0)]
     assert spread == pytest.approx([0.0005, 0.002, 0.008], rel=0.1)
 
 
-def test_smooth_noise_is_shared_by_neighbours():
-    independent = measure(wall(1.0), noise=0.002) - 1.0
-    shared = measure(wall(1.0), smooth_noise=0.002) - 1.0
+def test_waves_are_shared_by_neighbours():
+    independent = measured(wall(1.0), noise=0.002) - 1.0
+    shared = measured(wall(1.0), waves=0.002) - 1.0
     likeness = [np.corrcoef(e[:, :-1].ravel(), e[:, 1:].ravel())[0, 1] for e in (independent, shared)]
     assert likeness[0] < 0.1
     assert likeness[1] > 0.9
@@ -58,26 +56,15 @@ def test_steps_grow_with_distance_squared():
         assert np.median(np.diff(levels)) == pytest.approx(step, rel=0.1)
 
 
-def test_nothing_stays_nothing():
-    depth = wall(1.0)
-    depth[:40] = 0.0
-    assert not sensed(depth, CAMERA, np.random.default_rng(0), replace(SensorModel(), jitter=0.0))[:39].any()
-    assert quantised(np.zeros(3, dtype=np.float32), 0.001).tolist() == [0.0, 0.0, 0.0]
-
-
 def test_holes_are_at_edges_only():
-    depth = wall(1.0)
-    depth[:, 80:] = 1.2
-    lost = measure(depth, edge_holes=0.7) == 0.0
+    lost = measured(step(1.0, 1.2), edge_holes=0.7) == 0.0
     assert lost[:, 79:81].mean() == pytest.approx(0.7, abs=0.12)
     assert not lost[:, :79].any()
     assert not lost[:, 81:].any()
 
 
 def test_a_small_step_is_no_edge():
-    depth = wall(1.0)
-    depth[:, 80:] = 1.02
-    assert not at_edges(depth, 0.03).any()
+    assert not at_edges(step(1.0, 1.02), 0.03).any()
 
 
 def slanted(angle: float) -> np.ndarray:
@@ -96,15 +83,111 @@ def test_facing_is_the_cosine_to_the_ray(angle):
 
 
 def test_holes_come_at_grazing_angles():
-    shares = [float((measure(slanted(a), grazing=0.3)[50:70, 78:82] == 0).mean()) for a in (0.5, 1.4, 1.5)]
+    shares = [float((measured(slanted(a), grazing=0.3)[50:70, 78:82] == 0).mean()) for a in (0.5, 1.4, 1.5)]
     assert shares[0] == 0.0
     assert 0.2 < shares[1] < shares[2]
 
 
 def test_what_is_too_far_is_not_measured():
-    assert not measure(wall(4.5)).any()
+    assert not measured(wall(4.5)).any()
 
 
 def test_speckles_and_blobs_leave_holes():
-    assert (measure(wall(1.0), speckle_holes=0.05) == 0).mean() == pytest.approx(0.05, abs=0.01)
-    assert (measure(wall(1.0), blobs=40) == 0).mean() > 0.02
+    assert (measured(wall(1.0), speckle_holes=0.05) == 0).mean() == pytest.approx(0.05, abs=0.01)
+    assert (measured(wall(1.0), blobs=40) == 0).mean() > 0.02
+
+
+@pytest.mark.parametrize("radius", [2.0, 4.0, 7.0, 10.0])
+def test_a_field_is_as_smooth_as_wanted(radius):
+    """The correlation of white noise under a Gaussian window falls to 1/e at twice its radius."""
+    shape = (700, 700)
+    values = field(shape, radius, np.random.default_rng(0))
+    assert (values.shape, values.std()) == (shape, pytest.approx(1.0))
+    distance = round(2 * radius)
+    for one, other in (
+        (values[:, :-distance], values[:, distance:]),
+        (values[:-distance], values[distance:]),
+    ):
+        assert (one * other).mean() == pytest.approx(np.exp(-1), abs=0.12)
+
+
+def test_depth_is_displaced_against_the_pixels():
+    moved = measured(step(1.0, 1.2), shift=(3.0, 0.0))
+    assert np.array_equal(moved[:, 3:], step(1.0, 1.2)[:, :-3])
+    depth = step(1.0, 1.2).T[:, :120].copy()
+    camera = Intrinsics(width=120, height=160, fx=150.0, fy=150.0, cx=59.5, cy=79.5)
+    moved = measure(depth, camera, np.random.default_rng(0), Sensor(shift=(0.0, -2.0)))
+    assert np.array_equal(moved[:-2], depth[2:])
+
+
+@pytest.mark.parametrize(("errors", "shares"), [({"warp": 1.5}, (0.5, 1.0)), ({"jitter": 1.5}, (-0.2, 0.2))])
+def test_rims_are_wavy_or_frayed(errors, shares):
+    """Neighbours in a wavy rim lie at about the same column, in a frayed one they do not."""
+    rims = (measured(step(1.0, 1.2), **errors) == 1.0).sum(axis=1)
+    assert 0.7 < rims.std() < 6.0
+    least, most = shares
+    assert least < np.corrcoef(rims[:-1], rims[1:])[0, 1] < most
+
+
+def test_small_steps_are_blended_and_large_ones_are_not():
+    melted = measured(step(1.0, 1.01), blend=3.0, blend_gap=0.02)
+    assert np.all(np.diff(melted[60]) >= 0.0)
+    assert melted[60, 79] == pytest.approx(1.005, abs=0.001)
+    assert np.diff(melted[60]).max() < 0.002
+    assert measured(step(1.0, 1.1), blend=3.0, blend_gap=0.02) == pytest.approx(step(1.0, 1.1), abs=1e-6)
+
+
+def test_blending_leaves_a_slanted_plane():
+    plane = slanted(0.6)
+    inside = (slice(20, -20), slice(20, -20))
+    assert blended(plane, 3.0, 0.05)[inside] == pytest.approx(plane[inside], abs=0.0005)
+
+
+def test_concave_corners_are_rounded_towards_the_camera():
+    columns = np.abs(np.arange(CAMERA.width) - 80.0)
+    concave = (1.2 - 0.002 * columns)[None].repeat(CAMERA.height, axis=0).astype(np.float32)
+    error = measured(concave, rounding=0.5, rounding_radius=8.0) - concave
+    assert error[60, 80] < -0.004
+    assert np.abs(error[:, 40:50]).max() < 0.001
+    convex = (2.4 - concave).astype(np.float32)
+    assert np.abs(measured(convex, rounding=0.5, rounding_radius=8.0) - convex)[:, 60:100].max() < 0.001
+
+
+def test_pixels_at_edges_fly_between_the_surfaces():
+    flown = measured(step(1.0, 1.2), flying=0.6)
+    rim = flown[:, 79:81]
+    between = (rim > 1.0) & (rim < 1.2)
+    assert between.mean() == pytest.approx(0.6, abs=0.12)
+    assert np.array_equal(flown[:, :79], wall(1.0)[:, :79])
+
+
+def test_a_bias_grows_with_distance_squared_and_an_offset_does_not():
+    errors = [
+        [float(np.mean(measured(wall(z), **{name: 0.004}) - z)) for z in (0.5, 2.0)]
+        for name in ("bias", "offset")
+    ]
+    assert errors == [pytest.approx([0.001, 0.016], rel=1e-3), pytest.approx([0.004, 0.004], rel=1e-3)]
+
+
+def test_shadows_lie_on_the_side_away_from_the_projector():
+    """Behind a near strip, as wide as the disparities differ, whichever side the projector stands on."""
+    depth = wall(1.0)
+    depth[:, 70:90] = 0.5
+    disparity = 150.0 * 0.05 * (1 / 0.5 - 1 / 1.0)
+    for baseline, side in ((0.05, slice(None, 70)), (-0.05, slice(90, None))):
+        hidden = in_shadow(depth, CAMERA, baseline)
+        assert hidden[:, side].sum(axis=1) == pytest.approx(disparity, abs=2.0)
+        assert hidden.sum() == hidden[:, side].sum()
+
+
+def test_lines_are_lost_at_their_period():
+    lost = measured(wall(1.0), lines=5.0) == 0.0
+    assert lost.mean() == pytest.approx(1.0 - 0.8**2, abs=0.01)
+    assert lost.all(axis=0).sum() == pytest.approx(160 / 5, abs=1)
+
+
+def test_patches_are_as_many_and_as_wide_as_wanted():
+    lost = measured(wall(1.0), patches=0.1, patch_radius=6.0) == 0.0
+    assert lost.mean() == pytest.approx(0.1, abs=0.001)
+    changes = np.count_nonzero(np.diff(lost, axis=1))
+    assert lost.sum() / (changes / 2) > 4.0
