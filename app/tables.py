@@ -29,9 +29,13 @@ from sqlalchemy.orm import (
 
 Pose = list[list[float]]
 Mode = Literal["accurate", "quick"]
-Condition = Literal["manual", "snap", "auto", "three points", "click-to-place", "live snap", "find it"]
+Condition = Literal[
+    "manual", "snap", "paper snap", "auto", "three points", "click-to-place", "live snap", "find it"
+]
 """What a task may be done with: no machine, one that is asked, one that does more when it is sure; or, where
-studies compare techniques, the gizmo, Snap, and this one."""
+studies compare techniques, the gizmo, Snap, and this one. `paper snap` is Snap by the paper's filter."""
+Method = Literal["default", "paper"]
+"""What a snap is computed with: the fast default, or the particle filter of the paper."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -168,6 +172,8 @@ class Task(Base):
     T_world_object_reference: Mapped[Pose | None]
     is_for_studies: Mapped[bool] = mapped_column(default=False)
     """Only studies ask for it: nobody else is shown it."""
+    method: Mapped[str] = mapped_column(String(20), default="default")
+    """What Snap computes with unless the operator chooses, where the condition lets them."""
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     scene: Mapped[Scene] = relationship()
     object: Mapped[Object] = relationship()
@@ -346,6 +352,8 @@ class OfflineSnap(Base):
     input_hash: Mapped[str] = mapped_column(String(64), index=True)
     """Of pose, object, frame, configuration and version: all that the result hangs on. Equal inputs, such as
     the poses of an object that rests, are computed once."""
+    method: Mapped[str] = mapped_column(String(20), default="default")
+    """Of that configuration."""
     config: Mapped[dict[str, Any]]
     seed: Mapped[int] = mapped_column(BigInteger)
     T_world_object: Mapped[Pose | None]

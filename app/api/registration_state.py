@@ -8,7 +8,7 @@ from app.labeling.layers import Layers
 from app.labeling.seat import Seat
 from app.labeling.session_state import SessionState
 from app.labeling.tools import Tool
-from app.tables import Pose
+from app.tables import Method, Pose
 from registration_core import pose
 from registration_core.depth_agreement import Verdict
 
@@ -21,6 +21,7 @@ class SnapOut(BaseModel):
     state: str
     progress: float
     message: str | None
+    method: Method
 
 
 class OfferOut(BaseModel):
@@ -70,6 +71,10 @@ class RegistrationOut(BaseModel):
     condition: str
     tools: list[Tool]
     """What may be used beside the gizmo, undo and the views."""
+    method: Method
+    """What Snap computes with where it is not asked otherwise."""
+    methods: list[Method]
+    """What it may compute with."""
     state: str
     skip_reason: str | None
     frame_id: int
@@ -110,6 +115,8 @@ def registration_out(seat: Seat) -> RegistrationOut:
         task_id=seat.registration.task_id,
         condition=seat.registration.task.condition,
         tools=sorted(seat.session.tools),
+        method=state.method,
+        methods=list(seat.session.methods),
         state=state.state,
         skip_reason=state.skip_reason,
         frame_id=state.frame_id,
@@ -141,7 +148,12 @@ def _snap_out(state: SessionState) -> SnapOut | None:
     if snap is None:
         return None
     return SnapOut(
-        id=snap.id, asked_by=snap.asked_by, state=snap.state, progress=snap.progress, message=snap.message
+        id=snap.id,
+        asked_by=snap.asked_by,
+        state=snap.state,
+        progress=snap.progress,
+        message=snap.message,
+        method=snap.method,
     )
 
 

@@ -25,7 +25,7 @@ from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Actor
 from app.labeling.layers import Layers
 from app.labeling.session import LabelingSession
-from app.tables import Event, Pose
+from app.tables import Event, Method, Pose
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
@@ -55,6 +55,12 @@ class LiveChoice(BaseModel):
     """Whether the machine is to show where a snap would land, all the time."""
 
     on: bool
+
+
+class MethodChoice(BaseModel):
+    """What Snap is to compute with."""
+
+    method: Method
 
 
 class Skip(BaseModel):
@@ -108,6 +114,13 @@ def show_frame(body: FrameChoice, seat: SeatDep, identity: AnyoneDep) -> Registr
 def set_live(body: LiveChoice, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
     """Turn live snapping on or off."""
     seat.session.set_live(body.on, identity.actor)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/method")
+def choose_method(body: MethodChoice, seat: SeatDep) -> RegistrationOut:
+    """Choose what Snap computes with; live snapping, `auto` and the search stay with the default."""
+    seat.session.choose_method(body.method)
     return registration_out(seat)
 
 

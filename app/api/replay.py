@@ -10,9 +10,10 @@ from app.analysis.pose_errors import PoseErrors, pose_errors
 from app.analysis.trace import SAMPLE_SECONDS, Trace
 from app.api.dependencies import Id, IdentityDep, ServicesDep
 from app.api.tasks import Named
+from app.methods import method_of
 from app.replay.recording import Recording, ShownEvent
 from app.replay.replays import Replay
-from app.tables import Pose
+from app.tables import Method, Pose
 from registration_core import ObjectModel, pose
 
 router = APIRouter(prefix="/api/registrations", tags=["replay"])
@@ -37,6 +38,7 @@ class TraceEvent(SpanOut):
     snap_id: str | None
     dof: list[str] | None
     technique: str | None
+    method: Method | None = Field(description="of a snap, what it was computed with")
     confidence: float | None
 
 
@@ -168,15 +170,20 @@ def show_moment(body: NewMoment, services: ServicesDep, replay: ReplayDep) -> Mo
 
 
 def _events_out(recording: Recording) -> list[TraceEvent]:
+    methods = {
+        event.snap_id: method_of(event.detail["config"])
+        for event in recording.events
+        if event.kind == "snap_requested"
+    }
     return [
-        _event_out(sequence, event, SpanOut(start=span.start, end=span.end))
+        _event_out(sequence, event, SpanOut(start=span.start, end=span.end), methods.get(event.snap_id))
         for sequence, (event, span) in enumerate(
             zip(recording.events, recording.trace.spans, strict=True), start=1
         )
     ]
 
 
-def _event_out(sequence: int, event: ShownEvent, span: SpanOut) -> TraceEvent:
+def _event_out(sequence: int, event: ShownEvent, span: SpanOut, method: Method | None) -> TraceEvent:
     return TraceEvent(
         **span.model_dump(),
         sequence=sequence,
@@ -185,6 +192,7 @@ def _event_out(sequence: int, event: ShownEvent, span: SpanOut) -> TraceEvent:
         snap_id=event.snap_id,
         dof=event.dof,
         technique=event.detail.get("technique"),
+        method=method,
         confidence=event.detail.get("confidence"),
     )
 

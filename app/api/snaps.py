@@ -11,8 +11,9 @@ from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.problems import InputError
 from app.auth import Identity
 from app.labeling.start_spread import Unsaid
+from app.methods import method_of
 from app.services import Services
-from app.tables import EstimateRow, Event, Pose
+from app.tables import EstimateRow, Event, Method, Pose
 from registration_core import SnapConfig
 
 router = APIRouter(prefix="/api", tags=["snaps"])
@@ -36,7 +37,10 @@ class NewSnap(BaseModel):
 
     seed: int | None = Field(None, ge=0, lt=2**63, description="For a result that can be repeated.")
     config: dict[str, Any] | None = Field(
-        None, description='Changes to the default configuration, or {"preset": "paper"}.', examples=[{}]
+        None,
+        description='Changes to the configuration of {"preset": "default"} or {"preset": "paper"}; where no '
+        "preset is named, of the method that is chosen.",
+        examples=[{}],
     )
     start_spread: tuple[Metres, Radians] | None = Field(
         default_factory=lambda: None,  # which OpenAPI does not show: left out is something else than null
@@ -90,6 +94,7 @@ class EstimateOut(BaseModel):
     )
     converged: bool
     seed: int
+    method: Method
     config: dict[str, Any]
     start_spread: list[float] | None
     known_objects: list[KnownObjectOut] | None = Field(
@@ -127,7 +132,7 @@ def request_snap(seat: SeatDep, identity: AnyoneDep, body: NewSnap | None = None
     """Ask the machine for a better pose from the present one."""
     wanted = body or NewSnap(seed=None, config=None)
     try:
-        config = SnapConfig.from_dict(wanted.config or {})
+        config = SnapConfig.from_dict({"preset": seat.session.method, **(wanted.config or {})})
     except ValueError as error:
         raise InputError(f"body.{error}.") from error
     given = "start_spread" in wanted.model_fields_set
@@ -205,4 +210,5 @@ def _standing(services: Services, snap_id: str) -> StandingOut | None:
 
 
 def _estimate_out(row: EstimateRow) -> EstimateOut:
-    return EstimateOut(**{name: getattr(row, name) for name in EstimateOut.model_fields})
+    stored = {name: getattr(row, name) for name in EstimateOut.model_fields if name != "method"}
+    return EstimateOut(method=method_of(row.config), **stored)

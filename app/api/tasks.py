@@ -25,11 +25,12 @@ from app.api.dependencies import (
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Identity, Role
+from app.labeling.tools import methods_of
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose
 from app.study.participation import require_turn
-from app.tables import OUTSIDE_STUDIES, Condition, Frame, Mode, Object, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, Condition, Frame, Method, Mode, Object, Registration, Scene, Task
 from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
@@ -44,6 +45,10 @@ class NewTask(BaseModel):
     object_id: int = Field(ge=1, le=2**31 - 1)
     mode: Mode = "accurate"
     condition: Condition = "snap"
+    method: Method | None = Field(
+        None,
+        description="What Snap computes with unless the operator chooses; left out, the condition's own.",
+    )
 
 
 class Named(BaseModel):
@@ -90,6 +95,8 @@ class TaskOut(BaseModel):
     frame_id: int
     mode: str
     condition: str
+    method: str
+    """What Snap computes with unless the operator chooses."""
     state: TaskState
     operators: list[OperatorRef]
     mine: int | None
@@ -146,6 +153,7 @@ def get_task(task_id: Id, services: ServicesDep, identity: AnyoneDep) -> TaskOut
 @router.post("", status_code=201)
 def create_task(body: NewTask, services: ServicesDep, identity: AdminDep) -> TaskOut:
     """Ask for one more instance of an object in a scene."""
+    method = _method(body)
     with services.database.read() as session:
         scene, item = session.get(Scene, body.scene_id), session.get(Object, body.object_id)
         if scene is None:
@@ -171,6 +179,7 @@ def create_task(body: NewTask, services: ServicesDep, identity: AdminDep) -> Tas
             task = Task(**key, frame_id=frame.id, T_world_object_start=start.tolist())
             session.add(task)
         task.is_for_studies = False
+        task.method = method
         session.flush()
         return _out_for(identity)(_task(session, task.id))
 
@@ -194,6 +203,19 @@ def start_registration(task_id: Id, services: ServicesDep, identity: AnyoneDep) 
     if identity.role is Role.PARTICIPANT:
         require_turn(services.database, identity.user_id, task_id)
     return registration_out(services.desk.start(task_id, identity))
+
+
+def _method(body: NewTask) -> Method:
+    """What was asked for, or the condition's own."""
+    methods = methods_of(body.condition, in_study=False)
+    if body.method is None:
+        return methods[0]
+    if body.method not in methods:
+        raise InputError(
+            f"method {body.method!r} does not go with the condition {body.condition!r}; leave the method out,"
+            f" or choose the condition 'snap' or 'auto'."
+        )
+    return body.method
 
 
 def _start(services: Services, item: Object, frame: Frame) -> Any:
@@ -266,6 +288,7 @@ def _out(row: Task, registrations: Sequence[Registration], mine: Sequence[Regist
         frame_id=row.frame_id,
         mode=row.mode,
         condition=row.condition,
+        method=row.method,
         state=_state_of(registrations),
         operators=[
             OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason, registration_id=r.id)

@@ -28,7 +28,7 @@ from app.memory import give_back
 from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import Snapper
-from app.tables import Condition, EstimateRow, Registration, Task
+from app.tables import Condition, EstimateRow, Method, Registration, Task
 
 logger = logging.getLogger(__name__)
 
@@ -199,6 +199,7 @@ class Desk:
             request_search=dispatch.search,
             now=self._log.clock.monotonic,
             in_study=is_trial(registration),
+            method=cast(Method, task.method),
         )
 
         def depth_view(frame_id: int) -> DepthView:

@@ -23,8 +23,10 @@ from app.labeling.snap_exchange import (
     stored_spread,
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
-from app.labeling.tools import Tool, require
+from app.labeling.tools import Tool, require, require_method
 from app.labeling.track import ActionError, Array, Track
+from app.methods import method_of
+from app.tables import Method
 from registration_core import SnapConfig
 
 TAKE_OVER_CONFIDENCE = 0.9
@@ -42,6 +44,8 @@ class Machine:
         registration_id: Whose estimates these are.
         track: The object's way, which results are put on.
         tools: What may be used on this task.
+        methods: What Snap may compute with. Whatever the machine looks for unasked, and live, is by the
+        default: the operator does not wait for it.
         takes_turns: Whether it looks for a better pose whenever the operator lets go.
         same_pose: Tells whether the operator has seen a result before.
         request_snap: Hands an order to the workers.
@@ -53,6 +57,7 @@ class Machine:
         registration_id: int,
         track: Track,
         tools: Collection[Tool],
+        methods: Collection[Method],
         takes_turns: bool,
         same_pose: SamePose,
         request_snap: RequestSnap,
@@ -61,6 +66,7 @@ class Machine:
         self._registration_id = registration_id
         self._track = track
         self._tools = tools
+        self._methods = methods
         self._takes_turns = takes_turns
         self._same_pose = same_pose
         self._request_snap = request_snap
@@ -78,6 +84,8 @@ class Machine:
     ) -> str:
         """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
         require(self._tools, "snap")
+        method = method_of(config.to_dict())
+        require_method(self._methods, method)
         self.abandon(actor, "superseded")
         order = self._order(config, seed, start_spread)
         self._track.record(
@@ -95,7 +103,7 @@ class Machine:
                 },
             )
         )
-        self.status = SnapStatus(order.snap_id, actor)
+        self.status = SnapStatus(order.snap_id, actor, method=method)
         self.offer = None
         self._track.message = None
         then = self._track.history.current

@@ -23,10 +23,11 @@ from app.labeling.search import Region, RequestSearch, Search
 from app.labeling.session_state import SessionState
 from app.labeling.snap_exchange import KnownObject, RequestSnap
 from app.labeling.start_spread import StartSpread, Unsaid
-from app.labeling.tools import TOOL_OF, Tool, require, tools_of
+from app.labeling.tools import TOOL_OF, Tool, methods_of, require, require_method, tools_of
 from app.labeling.track import ActionError, RecordEvent, Track
 from app.labeling.turns import Turns
-from app.tables import Condition
+from app.methods import config_of
+from app.tables import Condition, Method
 from registration_core import SnapConfig
 
 Array = NDArray[np.float64]
@@ -53,6 +54,7 @@ class LabelingSession:
         known_objects: Tells what is known of other objects in the scene.
         now: Tells the seconds that the paths of drags are written down with.
         in_study: Whether by a participant, who has only what the condition is named after.
+        method: What Snap computes with until another one is chosen, where the condition lets it.
     """
 
     def __init__(
@@ -72,9 +74,13 @@ class LabelingSession:
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
         now: Callable[[], float] = time.monotonic,
         in_study: bool = False,
+        method: Method = "default",
     ) -> None:
         self.tools: frozenset[Tool] = tools_of(condition, in_study)
         """What may be used beside the gizmo, undo and the views."""
+        self.methods = methods_of(condition, in_study, method)
+        """What Snap may compute with."""
+        self._method = self.methods[0]
         self.registration_id = registration_id
         self._state = state
         self._skip_reason = skip_reason
@@ -86,6 +92,7 @@ class LabelingSession:
             registration_id,
             self._track,
             self.tools,
+            self.methods,
             condition == "auto",
             same_pose,
             lambda order, on_progress, on_end: request_snap(
@@ -107,6 +114,11 @@ class LabelingSession:
 
     # -- what is seen ------------------------------------------------------------------------------
 
+    @property
+    def method(self) -> Method:
+        """What Snap computes with where it is not asked otherwise."""
+        return self._method
+
     def snapshot(self) -> SessionState:
         """The present state."""
         with self._turns.alone:
@@ -126,6 +138,7 @@ class LabelingSession:
                 layers=self._layers,
                 snap=self._machine.status,
                 offer=self._machine.offer,
+                method=self._method,
                 is_live=self._machine.is_live,
                 live=self._machine.live,
                 estimate_snap_id=None if track.drag else history.current.snap_id,
@@ -285,7 +298,7 @@ class LabelingSession:
 
         Args:
             actor: Who asks.
-            config: `SnapConfig()` where it is None.
+            config: That of the chosen method where it is None.
             seed: A fresh one where it is None.
             start_spread: How far off the present pose may be; None where that is unknown.
 
@@ -294,7 +307,14 @@ class LabelingSession:
         """
         with self._turns.change():
             self._require_open()
-            return self._machine.snap(actor, config or SnapConfig(), seed, start_spread)
+            return self._machine.snap(actor, config or config_of(self._method), seed, start_spread)
+
+    def choose_method(self, method: Method) -> None:
+        """Let Snap compute with this from now on, where it is not asked otherwise. That moves nothing."""
+        with self._turns.change():
+            require(self.tools, "snap")
+            require_method(self.methods, method)
+            self._method = method
 
     def cancel_snap(self, actor: Actor) -> None:
         """Stop the snap that is under way; nothing happens where there is none."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.snap_exchange import Offer, SnapStatus
+from app.tables import Method
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,8 @@ class SessionState:
     layers: Layers
     snap: SnapStatus | None
     offer: Offer | None
+    method: Method
+    """What Snap computes with."""
     is_live: bool
     live: Offer | None
     """Where a snap would land now."""

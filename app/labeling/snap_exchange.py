@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.auth import Actor
 from app.labeling.start_spread import StartSpread
-from app.tables import EstimateRow
+from app.tables import EstimateRow, Method
 from registration_core import Estimate, ObjectModel, SnapConfig
 
 Array = NDArray[np.float64]
@@ -77,6 +77,8 @@ class SnapStatus:
     asked_by: Actor
     state: str = "queued"
     """queued, running, done, cancelled or failed."""
+    method: Method = "default"
+    """What it is computed with."""
     progress: float = 0.0
     message: str | None = None
 

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 from app.auth import Role
 from app.labeling.track import ActionError
-from app.tables import Condition, Registration
+from app.tables import Condition, Method, Registration
 
 Tool = Literal[
     "snap",
@@ -30,6 +30,7 @@ ORDINARY: frozenset[Tool] = frozenset({"copy", "neighbours", "agreement", "endin
 COMPARED: dict[Condition, frozenset[Tool]] = {
     "manual": frozenset(),
     "snap": frozenset({"snap"}),
+    "paper snap": frozenset({"snap"}),
     "auto": frozenset({"snap"}),
     "three points": frozenset({"snap", "three points"}),
     "click-to-place": frozenset({"snap", "click-to-place"}),
@@ -64,6 +65,28 @@ def tools_of(condition: Condition, in_study: bool) -> frozenset[Tool]:
             return ALL
         case technique:
             return COMPARED[technique] | ORDINARY
+
+
+def methods_of(condition: Condition, in_study: bool, method: Method = "default") -> tuple[Method, ...]:
+    """What Snap may compute with on a task; the first until another one is chosen.
+
+    A trial, and a technique that is compared, has one method. Elsewhere the operator chooses; `method` is
+    what the task says.
+    """
+    if condition == "paper snap":
+        return ("paper",)
+    if in_study or condition not in ("snap", "auto"):
+        return ("default",)
+    return (method, *(other for other in get_args(Method) if other != method))
+
+
+def require_method(methods: Collection[Method], method: Method) -> None:
+    """Raise `ActionError` where Snap may not compute with a method."""
+    if method not in methods:
+        raise ActionError(
+            f"Snaps of this task are not computed with the method {method!r}: its condition has"
+            f" {', '.join(methods)} alone."
+        )
 
 
 def require(tools: Collection[Tool], tool: Tool) -> None:

@@ -7,6 +7,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, selectinload
 
 from app.database import Database
+from app.labeling.tools import methods_of
 from app.scene_data import SceneData, camera_of
 from app.start_pose import start_pose
 from app.study.plan import Slot, StudyError, TaskRef
@@ -68,5 +69,6 @@ def ensure_task(session: Session, slot: Slot, start: Start) -> None:
                 T_world_object_start=start.T_world_object_start,
                 T_world_object_reference=start.T_world_object_reference,
                 is_for_studies=True,
+                method=methods_of(slot.condition, in_study=True)[0],
             )
         )

@@ -8,6 +8,7 @@ const MODES = { accurate: "As accurately as you can", quick: "As quickly as you 
 const TOOLS = {
   manual: "The handles of the object alone; there is no machine that helps.",
   snap: "The handles, and Snap (Space): roughly in place, the machine fits the object to its points.",
+  "paper snap": "The handles, and Snap (Space): roughly in place, the machine fits the object to its points in some seconds.",
   auto:
     "The handles, and Snap (Space). After each move the machine looks by itself, too, and takes over where it is " +
     "confident; you may take that back.",

@@ -11,7 +11,7 @@ from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
 from app.labeling.snap_exchange import RequestSnap, SnapFailure, SnapOrder, SnapResult
-from app.tables import Condition, EstimateRow
+from app.tables import Condition, EstimateRow, Method
 from registration_core import Ambiguity, Estimate, Hypothesis, pose
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
@@ -129,6 +129,7 @@ class Bench:
         condition: Condition = "snap",
         in_study: bool = False,
         request_snap: RequestSnap | None = None,
+        method: Method = "default",
     ) -> None:
         self.log = Log()
         self.workers = Workers()
@@ -146,6 +147,7 @@ class Bench:
             request_snap=request_snap or self.workers,
             request_search=self.searchers,
             in_study=in_study,
+            method=method,
         )
 
     @property

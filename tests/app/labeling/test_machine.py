@@ -7,6 +7,7 @@ from app.auth import Actor
 from app.labeling.machine import TAKE_OVER_CONFIDENCE
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
+from registration_core import SnapConfig
 from tests.app.labeling.bench import START, Bench, result, shifted
 
 SURE, UNSURE = TAKE_OVER_CONFIDENCE, TAKE_OVER_CONFIDENCE - 0.01
@@ -129,3 +130,29 @@ def test_a_turn_that_comes_to_nothing_leaves_the_drag(auto):
     auto.workers.snaps[0].end(SnapFailure("outside the image"))
     assert auto.log.kinds == ["drag", "snap_requested", "snap_failed"]
     assert np.array_equal(auto.state.T_world_object, shifted(0.1))
+
+
+# -- methods
+
+
+def test_snap_computes_with_the_tasks_method_until_another_is_chosen():
+    bench = Bench(method="paper")
+    bench.session.snap(Actor.HUMAN)
+    assert bench.workers.snaps[-1].order.config == SnapConfig.paper()
+    assert bench.state.method == bench.state.snap.method == "paper"
+    bench.session.choose_method("default")
+    bench.session.snap(Actor.HUMAN)
+    assert bench.workers.snaps[-1].order.config == SnapConfig()
+    assert bench.log.kinds == ["snap_requested", "snap_cancelled", "snap_requested"]
+
+
+def test_what_the_machine_looks_for_unasked_is_by_the_default():
+    bench = Bench(condition="auto", method="paper")
+    bench.drag(shifted(0.1))
+    assert bench.workers.snaps[-1].order.config == SnapConfig()
+    bench.session.set_live(True, Actor.HUMAN)
+    bench.session.cancel_snap(Actor.HUMAN)
+    bench.session.start_drag()
+    bench.session.drag_to(shifted(0.2))
+    assert bench.workers.snaps[-1].order.is_live
+    assert bench.workers.snaps[-1].order.config == SnapConfig()

@@ -7,7 +7,7 @@ import pytest
 
 from app.auth import Actor
 from app.labeling.layers import Layers
-from app.labeling.tools import ALL, COMPARED, MACHINES, require, tools_of
+from app.labeling.tools import ALL, COMPARED, MACHINES, methods_of, require, tools_of
 from app.labeling.track import ActionError
 from tests.app.labeling.bench import START, Bench, result
 
@@ -81,6 +81,22 @@ def test_ordinary_work_with_a_technique_has_it_and_what_is_no_technique():
     tools = tools_of("three points", False)
     assert {"snap", "three points", "copy", "ending"} <= tools
     assert not tools & {"click-to-place", "precision", "find it", "live snap"}
+
+
+def test_a_trial_has_one_method_whatever_its_task_says():
+    for condition in COMPARED:
+        expected = ("paper",) if condition == "paper snap" else ("default",)
+        assert methods_of(condition, True, "paper") == expected
+        bench = Bench(condition=condition, in_study=True)
+        with pytest.raises(ActionError, match="method"):
+            bench.session.choose_method("default" if condition == "paper snap" else "paper")
+
+
+def test_the_operator_has_the_choice_where_snap_is_not_compared_with_anything():
+    for condition in ("snap", "auto"):
+        assert methods_of(condition, False) == ("default", "paper")
+        assert methods_of(condition, False, "paper") == ("paper", "default")
+    assert methods_of("live snap", False, "paper") == ("default",)
 
 
 def test_what_is_refused_is_named():
