@@ -147,6 +147,13 @@ def observe_region(
     return Observation(grid, int(np.count_nonzero(near & (unknown.depth > 0))))
 
 
+def is_held_out(rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether a snap leaves these pixels unread wherever it reduces the image: every other one, as on a
+    checkerboard. Its result can be checked by them.
+    """
+    return (rows + columns) % 2 == 1
+
+
 def _reduced_mask(mask: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
     """Blocks of which at least half is set."""
     rows, columns = mask.shape[0] // block, mask.shape[1] // block
@@ -158,20 +165,22 @@ def _reduced_mask(mask: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
 def _reduce(depth, block, gap, out):
     """Mean of each block over the pixels within `gap` of its nearest one; `out` has a border of 1.
 
+    Of a block of more than one pixel, every other one is left out: see `is_held_out`.
     A whole row of blocks is carried along together: the inner loops are then vectorised.
     """
     columns = out.shape[1] - 2
     far = f4(1e9)
     nearest, total, count = np.empty((3, columns), np.float32)
+    step = 2 if block > 1 else 1
     for i in range(out.shape[0] - 2):
         nearest[:], total[:], count[:] = far, f4(0), f4(0)
         for a in range(block):
-            for b in range(block):
+            for b in range(a % step, block, step):
                 for j in range(columns):
                     z = depth[i * block + a, j * block + b]
                     nearest[j] = min(nearest[j], z if z > f4(0) else far)
         for a in range(block):
-            for b in range(block):
+            for b in range(a % step, block, step):
                 for j in range(columns):
                     z = depth[i * block + a, j * block + b]
                     m = f4(1) if z > f4(0) and z - nearest[j] < gap else f4(0)

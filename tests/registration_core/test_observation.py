@@ -5,7 +5,7 @@ import pytest
 
 from registration_core import Intrinsics, SnapConfig, pose
 from registration_core.camera import depth_to_points
-from registration_core.observation import observe, reduction, window
+from registration_core.observation import is_held_out, observe, reduction, window
 from registration_core.rasterizer import render_depth
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import block, model_of, standing_tool, tool
@@ -59,6 +59,16 @@ def test_border_is_never_measured() -> None:
     ).grid.depth
     assert not depth[[0, -1]].any()
     assert not depth[:, [0, -1]].any()
+
+
+@pytest.mark.parametrize(("focal", "are_read"), [(150.0, True), (300.0, False), (1200.0, False)])
+def test_pixels_that_are_held_out_are_not_read_where_the_image_is_reduced(focal, are_read) -> None:
+    size = int(focal * 0.8)
+    camera = Intrinsics(size, size, focal, focal, size / 2 - 0.5, size / 2 - 0.5)
+    depth = render_depth(model_of(block((3.0, 3.0, 0.01))), camera, pose.exp([0, 0, 0.8, 0.5, 0.2, 0]))
+    other = np.where(is_held_out(*np.indices(depth.shape)), np.float32(0.7), depth)
+    before, after = look(depth, camera).grid, look(other, camera).grid
+    assert np.array_equal(before.depth, after.depth) != are_read
 
 
 def test_window_is_aligned_and_within_the_image() -> None:
