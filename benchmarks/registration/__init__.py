@@ -1,6 +1,7 @@
 """Snaps and their peers on synthetic and real scenes: `python -m benchmarks registration`.
 
-With `BENCHMARK_OVERLAYS=FOLDER` set, pictures of what failed are written to that folder.
+With `BENCHMARK_OVERLAYS=FOLDER` set, pictures of what failed are written to that folder. A part of the run:
+`BENCHMARK_SETS=moro,apc BENCHMARK_METHODS=default,prototype BENCHMARK_STARTS=2`, names or parts of names.
 """
 
 from pathlib import Path

@@ -43,7 +43,7 @@ def _figures(instances: Sequence[Instance], seeds: int) -> list[Figure]:
                     instance.model, instance.depth, instance.camera, region, rng=np.random.default_rng(seed)
                 )
                 seconds.append(time.perf_counter() - began)
-                errors = [judge.error(h.T_camera_object, instance.truth) for h in hypotheses[:FIRST]]
+                errors = [judge.nearest_error(h.T_camera_object, instance.truths) for h in hypotheses[:FIRST]]
                 found.append(any(error.is_right for error in errors))
         name = f"{instances[0].set_name}, a right pose among the first {FIRST} proposals, {where}"
         figures.append(Figure(name, 100.0 * float(np.mean(found)), "%", FOUND))

@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.registration.objects import DATA, known_objects, read_model, ycb_object
+from benchmarks.registration.objects import APC_BOX, DATA, known_objects, with_symmetries, ycb_object
 from benchmarks.registration.starts import is_in_view
 from registration_core import Intrinsics, ObjectModel, pose
-from registration_core.bop import read_dataset, read_depth
+from registration_core.bop import BopObject, read_dataset, read_depth
 from registration_core.synthetic_scene import View, make_scene
 from registration_core.tabletop import Layout
 
 Array = NDArray[np.float64]
 
-HALF, HIDDEN, YCB, BUNNY = "at least half visible", "30-50 % visible", "ycbv/000001", "bunny"
-SYNTHETIC, REAL = (HALF, HIDDEN), (YCB, BUNNY)
+HALF, HIDDEN = "at least half visible", "30-50 % visible"
+YCB, BUNNY, MORO, APC, RBT = "ycbv/000001", "bunny", "moro", "apc", "rbt"
+SYNTHETIC, REAL = (HALF, HIDDEN), (YCB, BUNNY, MORO, APC, RBT)
 SETS = SYNTHETIC + REAL
 
 
@@ -42,8 +43,10 @@ RECIPES = {
 OBJECTS_A_SCENE, VIEWS_A_SCENE = 5, 3
 MOST_SCENES = 60
 """After which an object that has not shown as it should often enough is left at what there is."""
-BUNNY_STEP = 3
-"""Every third of its 24 views, 45 degrees apart."""
+FOLDERS = {YCB: "ycbv", BUNNY: "bunny", MORO: "moro", APC: "apc", RBT: "rbt"}
+"""Of the datasets, in `DATA`; scene 1 of each is annotated."""
+FRAME_STEPS = {BUNNY: 3, RBT: 4}
+"""Of the bunny every third of 24 views, 45 degrees apart; of the video every fourth of 50 frames."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +70,13 @@ class Instance:
     color_path: Path | None = None
     T_world_camera: Array | None = None
     """(4, 4), where it is known."""
+    alike: tuple[Array, ...] = ()
+    """`T_camera_object` of what else in the image has this very shape: to depth they are one object."""
+
+    @property
+    def truths(self) -> tuple[Array, ...]:
+        """Every pose (4, 4) that is right."""
+        return (self.truth, *self.alike)
 
 
 def synthetic_instances(set_name: str, an_object: int, most_scenes: int = MOST_SCENES) -> list[Instance]:
@@ -109,31 +119,38 @@ def real_instances(set_name: str) -> list[Instance]:
     """The annotated objects of a real scene; none where the data is not there."""
     if not DATA.is_dir():
         return []
-    return list(_ycb() if set_name == YCB else _bunny())
+    return list(_annotated(set_name))
 
 
-def _ycb() -> Iterator[Instance]:
-    dataset = read_dataset(DATA / "ycbv")
+def _annotated(set_name: str) -> Iterator[Instance]:
+    dataset = read_dataset(DATA / FOLDERS[set_name])
     images = next(scene for scene in dataset.scenes if scene.scene_id == 1).images
-    names = {known.obj_id: known.name for known in dataset.objects}
-    seed = 0
-    for image in images:
+    models = {known.obj_id: _model(set_name, known) for known in dataset.objects}
+    names = {known.obj_id: _name(set_name, known) for known in dataset.objects}
+    for image in images[:: FRAME_STEPS.get(set_name, 1)]:
         depth = read_depth(image.depth_path, image.depth_scale)
-        for truth in image.ground_truth or ():
+        truths = image.ground_truth or ()
+        for index, truth in enumerate(truths):
+            model, name = models[truth.obj_id], names[truth.obj_id]
+            alike = tuple(
+                other.T_camera_object
+                for other in truths
+                if other is not truth and models[other.obj_id].content_hash == model.content_hash
+            )
+            # the neighbouring frames of YCB-Video differ by object, the others by view
+            scene = name if set_name == YCB else str(image.image_id)
             yield Instance(
-                YCB, f"{YCB} {names[truth.obj_id]}", names[truth.obj_id], ycb_object(truth.obj_id), depth,
-                image.camera, truth.T_camera_object, seed, color_path=image.color_path,
+                set_name, f"{set_name} {scene}", name, model, depth, image.camera, truth.T_camera_object,
+                image.image_id * len(truths) + index, color_path=image.color_path,
+                T_world_camera=image.T_world_camera, alike=alike,
             )  # fmt: skip
-            seed += 1
 
 
-def _bunny() -> Iterator[Instance]:
-    (scene,) = read_dataset(DATA / "bunny").scenes
-    model = read_model(DATA / "bunny", 1)
-    for image in scene.images[::BUNNY_STEP]:
-        (truth,) = image.ground_truth or ()
-        yield Instance(
-            BUNNY, f"{BUNNY} {image.image_id}", BUNNY, model, read_depth(image.depth_path, image.depth_scale),
-            image.camera, truth.T_camera_object, image.image_id, color_path=image.color_path,
-            T_world_camera=image.T_world_camera,
-        )  # fmt: skip
+def _model(set_name: str, known: BopObject) -> ObjectModel:
+    if set_name == YCB:
+        return ycb_object(known.obj_id)
+    return with_symmetries(known.model, APC_BOX) if set_name == APC else known.model
+
+
+def _name(set_name: str, known: BopObject) -> str:
+    return known.name if set_name == YCB else f"{set_name} {known.obj_id}"

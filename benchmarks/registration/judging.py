@@ -1,5 +1,6 @@
 """How wrong a pose is, and what is called right."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -77,6 +78,10 @@ class Judge:
             ),
             rotation=pose_error.rotation_error(T_estimate, twin),
         )
+
+    def nearest_error(self, T_estimate: Array, truths: Sequence[Array]) -> Error:
+        """The error against whichever of several true poses (4, 4) is nearest by ADD(-S)."""
+        return min((self.error(T_estimate, T_truth) for T_truth in truths), key=lambda error: error.add)
 
     @cached_property
     def _outermost(self) -> Array:

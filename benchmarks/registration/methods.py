@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.registration import peers
+from benchmarks.registration import peers, prototype
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
 from registration_core import SnapConfig, snap, warm_up
@@ -22,14 +22,20 @@ from registration_core.snap_config import ParticleFilterConfig
 Array = NDArray[np.float64]
 
 NOTHING, ICP, BEST_OF, GICP = "no-op", "Open3D ICP", "Open3D ICP, best of 32", "small_gicp GICP"
+PROTOTYPE = "research prototype"
 PAPER, DEFAULT, TOLD = "paper()", "default", "default, spread told"
-METHODS = (NOTHING, ICP, BEST_OF, GICP, PAPER, DEFAULT, TOLD)
-PEERS = (GICP, BEST_OF)
+METHODS = (NOTHING, ICP, BEST_OF, GICP, PROTOTYPE, PAPER, DEFAULT, TOLD)
+PEERS = (GICP, BEST_OF, PROTOTYPE)
 """Whose success and time the default has to beat."""
 
 STARTS_OF_BEST = 32
 SHORT_PAPER = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(50, 5))
 """The same code as `SnapConfig.paper()`, for a quick run."""
+
+
+def available_methods() -> tuple[str, ...]:
+    """METHODS without the prototype where that does not lie beside the project."""
+    return tuple(name for name in METHODS if name != PROTOTYPE or prototype.is_there())
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +55,14 @@ def register(
         config = SnapConfig() if method != PAPER else SHORT_PAPER if quick else SnapConfig.paper()
         spread = (shell.translation, shell.rotation) if method == TOLD else None
         return _snapped(instance, T_start, config, spread, seed)
+    if method == PROTOTYPE:
+        prototype.prepare(instance.model)
     align: Callable[[], Array] = {
         NOTHING: lambda: T_start,
         ICP: lambda: peers.open3d_icp(instance, T_start),
         BEST_OF: lambda: peers.open3d_best_of(instance, T_start, shell, STARTS_OF_BEST, seed),
         GICP: lambda: peers.gicp(instance, T_start),
+        PROTOTYPE: lambda: prototype.prototype_snap(instance, T_start, seed),
     }[method]
     began = time.perf_counter()
     T = align()

@@ -1,25 +1,43 @@
 """What is tried on which instances, and everything that comes of it."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
 
 from benchmarks.figures import Figure
+from benchmarks.registration import prototype
 from benchmarks.registration.agreement import print_agreement
 from benchmarks.registration.anywhere import proposal_figures
+from benchmarks.registration.choice import Choice
 from benchmarks.registration.instances import (
+    APC,
+    BUNNY,
     HALF,
+    HIDDEN,
+    MORO,
     MOST_SCENES,
+    RBT,
     REAL,
+    SETS,
     SYNTHETIC,
     YCB,
     Instance,
     real_instances,
     synthetic_instances,
 )
-from benchmarks.registration.methods import BEST_OF, DEFAULT, GICP, ICP, METHODS, NOTHING, PAPER, TOLD
+from benchmarks.registration.methods import (
+    BEST_OF,
+    DEFAULT,
+    GICP,
+    ICP,
+    NOTHING,
+    PAPER,
+    PROTOTYPE,
+    TOLD,
+    available_methods,
+)
 from benchmarks.registration.objects import DATA
 from benchmarks.registration.overlays import write_overlays
 from benchmarks.registration.several_views import view_figures
@@ -37,8 +55,12 @@ AN_OBJECT = 8
 """Synthetic instances of each object in each set."""
 QUICK_SCENES = 3
 """Of each synthetic set, in a quick run; they hold at least one instance."""
-STARTS, REAL_STARTS = 5, 20
-"""From each shell about each instance."""
+STARTS = {HALF: 5, HIDDEN: 5, YCB: 20, BUNNY: 20, MORO: 6, APC: 20, RBT: 8}
+"""From each shell about each instance: fewer where there are many instances."""
+WIDELY_STARTED = (*SYNTHETIC, YCB, BUNNY)
+"""Sets that are started from the farthest shell, too."""
+VIEW_STARTS = 20
+"""Of each group of views."""
 SEEDS = 10
 """Of proposals for each instance."""
 STARTS_A_SLOW_ONE = 5
@@ -52,43 +74,63 @@ INSTANCES_AN_AGREEMENT = 3
 def measure(quick: bool) -> list[Figure]:
     """All figures; prints tables, and writes overlays where asked."""
     console = Console(highlight=False, width=max(Console().width, TABLE_WIDTH))
+    try:
+        choice = Choice.read(SETS, available_methods())
+    except ValueError as error:
+        raise SystemExit(str(error)) from error
     if not DATA.is_dir():
         console.print(f"The real scenes and the YCB objects are left out: there is no {DATA}.")
-    scenes = QUICK_SCENES if quick else MOST_SCENES
-    instances = [
-        *(one for name in SYNTHETIC for one in synthetic_instances(name, AN_OBJECT, scenes)),
-        *(one for name in REAL for one in real_instances(name)),
+    if not prototype.is_there():
+        console.print(f"The research prototype is left out: there is no {prototype.FOLDER}.")
+    instances = _instances(choice, quick)
+    plans = [
+        _quick_plan(choice) if quick else _plan(one, number, choice) for number, one in enumerate(instances)
     ]
-    if quick:
-        instances = [next(one for one in instances if one.set_name == name) for name in _sets(instances)]
-    plans = [_quick_plan() if quick else _plan(one, number) for number, one in enumerate(instances)]
-    timed = timings([one for one in instances if one.set_name == HALF], quick)
+    timed = [] if choice.is_part else timings([one for one in instances if one.set_name == HALF], quick)
     results = run_trials(instances, plans, quick, console)
     trials = [trial for result in results for trial in result.trials]
-    for name in _sets(instances):
+    for name in choice.sets:
         print_tables(console, trials, name)
     for title, sets in (("synthetic", SYNTHETIC), ("real", REAL)):
         own = [t for t in trials if t.method == DEFAULT and t.set_name in sets and t.shell != GOOD]
         if own:
             print_reliability(console, own, title)
-    synthetic = [one for one in instances if one.set_name in SYNTHETIC]
-    print_agreement(console, synthetic[::INSTANCES_AN_AGREEMENT])
     if folder := os.environ.get(OVERLAYS_VARIABLE):
         write_overlays(Path(folder), instances, trials)
-    proposed = proposal_figures([one for one in instances if one.set_name == YCB], 1 if quick else SEEDS)
-    return [*figures(results), *view_figures(1 if quick else REAL_STARTS), *proposed, *timed]
+    return [*figures(results), *([] if choice.is_part else _beside_trials(instances, quick, console)), *timed]
 
 
-def _sets(instances: list[Instance]) -> list[str]:
-    return list(dict.fromkeys(one.set_name for one in instances))
+def _instances(choice: Choice, quick: bool) -> list[Instance]:
+    scenes = QUICK_SCENES if quick else MOST_SCENES
+    found = [
+        synthetic_instances(name, AN_OBJECT, scenes) if name in SYNTHETIC else real_instances(name)
+        for name in choice.sets
+    ]
+    return [one for own in found for one in (own[:1] if quick else own)]
 
 
-def _plan(instance: Instance, number: int) -> dict[Shell, Mapping[str, int]]:
-    count = REAL_STARTS if instance.set_name in REAL else STARTS
-    fast = dict.fromkeys((NOTHING, ICP, GICP, DEFAULT, TOLD), count)
-    slow = {BEST_OF: count // STARTS_A_SLOW_ONE, PAPER: int(number % INSTANCES_A_PAPER == 0)}
-    return {**dict.fromkeys(SHELLS, fast | slow), GOOD: dict.fromkeys((NOTHING, GICP, DEFAULT, TOLD), count)}
+def _beside_trials(instances: Sequence[Instance], quick: bool, console: Console) -> list[Figure]:
+    """What is measured of snaps without trials of single starts."""
+    print_agreement(
+        console, [one for one in instances if one.set_name in SYNTHETIC][::INSTANCES_AN_AGREEMENT]
+    )
+    on_views = view_figures(1 if quick else VIEW_STARTS)
+    seeds = 1 if quick else SEEDS
+    return [*on_views, *proposal_figures([one for one in instances if one.set_name == YCB], seeds)]
 
 
-def _quick_plan() -> dict[Shell, Mapping[str, int]]:
-    return dict.fromkeys((NEAR, MIDDLE, GOOD), dict.fromkeys(METHODS, 1))
+def _plan(instance: Instance, number: int, choice: Choice) -> dict[Shell, Mapping[str, int]]:
+    count = min(STARTS[instance.set_name], choice.starts or STARTS[instance.set_name])
+    fast = dict.fromkeys((NOTHING, ICP, GICP, PROTOTYPE, DEFAULT, TOLD), count)
+    slow = {BEST_OF: -(-count // STARTS_A_SLOW_ONE), PAPER: int(number % INSTANCES_A_PAPER == 0)}
+    shells = SHELLS if instance.set_name in WIDELY_STARTED else SHELLS[:-1]
+    near = dict.fromkeys((NOTHING, GICP, PROTOTYPE, DEFAULT, TOLD), count)
+    plan = {**dict.fromkeys(shells, fast | slow), GOOD: near}
+    return {
+        shell: {name: n for name, n in counts.items() if name in choice.methods}
+        for shell, counts in plan.items()
+    }
+
+
+def _quick_plan(choice: Choice) -> dict[Shell, Mapping[str, int]]:
+    return dict.fromkeys((NEAR, MIDDLE, GOOD), dict.fromkeys(choice.methods, 1))

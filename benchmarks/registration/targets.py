@@ -65,6 +65,8 @@ def _ambiguities(trials: Sequence[Trial]) -> Iterable[Figure]:
 
 def _noise_limit(results: Sequence[InstanceTrials]) -> Iterable[Figure]:
     synthetic = [result for result in results if result.trials[0].set_name in SYNTHETIC]
+    if not synthetic:
+        return
     limit = _percent([result.polish_error.is_close for result in synthetic])
     yield Figure("synthetic, within 2 mm and 2°, polish from the truth", limit, "%")
     trials = [trial for result in synthetic for trial in result.trials if trial.method == DEFAULT]
@@ -107,7 +109,12 @@ def _peers(trials: Sequence[Trial]) -> Iterable[Figure]:
         for peer in PEERS:
             leads, shares = [], []
             for shell in SHELLS:
-                theirs = [t for t in trials if (t.set_name, t.shell, t.method) == (set_name, shell, peer)]
+                theirs = [
+                    t
+                    for t in trials
+                    if (t.set_name, t.shell, t.method) == (set_name, shell, peer)
+                    and (t.instance, t.shell, t.start, DEFAULT) in by_start
+                ]
                 ours = [by_start[t.instance, t.shell, t.start, DEFAULT] for t in theirs]
                 if theirs:
                     leads.append(

@@ -97,16 +97,17 @@ def try_instance(instance: Instance, number: int, plan: Plan, quick: bool) -> In
     polish_error = judge.error(polished_truth(instance), instance.truth)  # builds the viewpoint model, too
     trials = []
     for shell, counts in plan.items():
-        most = max(counts.values())
+        most = max(counts.values(), default=0)
         poses = starts(instance.truth, instance.model, instance.camera, shell, most, instance.seed)
-        errors = [judge.error(T_start, instance.truth) for T_start in poses]
-        for method, count in counts.items():
-            for n, T_start in enumerate(poses[:count]):
+        for n, T_start in enumerate(poses):
+            start_error = judge.nearest_error(T_start, instance.truths)
+            # side by side in time, too: what else the machine does slows all of them
+            for method in (name for name, count in counts.items() if n < count):
                 outcome = register(method, instance, T_start, shell, n, quick)
-                error = judge.error(outcome.T_camera_object, instance.truth)
+                error = judge.nearest_error(outcome.T_camera_object, instance.truths)
                 trials.append(
                     Trial(
-                        instance.set_name, instance.scene, number, shell, n, method, errors[n],
+                        instance.set_name, instance.scene, number, shell, n, method, start_error,
                         error, T_start, outcome.T_camera_object,
                         not error.is_right and fits_as_well(instance, outcome.T_camera_object),
                         outcome.seconds, outcome.confidence,

@@ -66,3 +66,10 @@ def test_add_of_an_asymmetric_object_matches_points_with_themselves() -> None:
     alike = ObjectModel(drill.vertices, drill.faces, OBJECTS["box"].symmetries)
     estimate = turned(TRUTH, 0, 25.0)
     assert Judge(alike).error(estimate, TRUTH).add < 0.7 * Judge(drill).error(estimate, TRUTH).add
+
+
+def test_the_nearest_of_several_true_poses_counts() -> None:
+    judge, other = Judge(OBJECTS["drill"]), pose.exp([0.3, 0.0, 0.8, 0.0, 1.0, 0.0])
+    estimate = turned(TRUTH, 0, 5.0)
+    assert judge.nearest_error(estimate, [other, TRUTH]) == judge.error(estimate, TRUTH)
+    assert judge.nearest_error(other, [TRUTH, other]).is_close
