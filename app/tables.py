@@ -258,6 +258,8 @@ class EstimateRow(Base):
     start_spread: Mapped[list[Any] | None]
     known_objects: Mapped[list[Any] | None]
     version: Mapped[str] = mapped_column(String(40))
+    algorithm: Mapped[str | None] = mapped_column(String(12))
+    """`registration_core.ALGORITHM` where it was computed; None where an older version did not say."""
     hardware: Mapped[str] = mapped_column(String(200))
     seconds: Mapped[float] = mapped_column(Float)
     evaluations: Mapped[int]
@@ -350,8 +352,8 @@ class OfflineSnap(Base):
     """Of the trace, where the pose was."""
     T_world_object_start: Mapped[Pose]
     input_hash: Mapped[str] = mapped_column(String(64), index=True)
-    """Of pose, object, frame, configuration and version: all that the result hangs on. Equal inputs, such as
-    the poses of an object that rests, are computed once."""
+    """Of pose, object, frame, configuration and algorithm: all that the result depends on. Equal inputs, such
+    as the poses of an object that rests, are computed once."""
     method: Mapped[str] = mapped_column(String(20), default="default")
     """Of that configuration."""
     config: Mapped[dict[str, Any]]
@@ -364,6 +366,8 @@ class OfflineSnap(Base):
     """As measured."""
     evaluations: Mapped[int]
     version: Mapped[str] = mapped_column(String(40))
+    algorithm: Mapped[str | None] = mapped_column(String(12))
+    """As that of an estimate."""
     hardware: Mapped[str] = mapped_column(String(200))
 
 

@@ -19,6 +19,7 @@ from distributed import get_worker
 from numpy.typing import NDArray
 
 from registration_core import (
+    ALGORITHM,
     Estimate,
     Hypothesis,
     Intrinsics,
@@ -110,6 +111,8 @@ class Proposals:
 
     hypotheses: tuple[Hypothesis, ...]
     seconds: float
+    algorithm: str
+    """`registration_core.ALGORITHM` of the worker."""
     hardware: str
 
 
@@ -127,7 +130,7 @@ class SearchJob(Job[Proposals]):
         started = time.perf_counter()
         rng = np.random.default_rng(self.seed)
         found = propose(model, self.depth, self.camera, self.region, self.config, rng)
-        return Proposals(found, time.perf_counter() - started, hardware())
+        return Proposals(found, time.perf_counter() - started, ALGORITHM, hardware())
 
 
 def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None = None) -> Result | None:

@@ -1,6 +1,7 @@
 """Six-degree-of-freedom registration of known objects in depth images: geometry and numerics only."""
 
 from registration_core.acceptance import NEVER, Calibration, acceptance, calibration_of
+from registration_core.algorithm import ALGORITHM
 from registration_core.camera import Intrinsics
 from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
@@ -16,6 +17,7 @@ from registration_core.symmetry_search import find_symmetries
 from registration_core.views import snap_views
 
 __all__ = [
+    "ALGORITHM",
     "NEVER",
     "Ambiguity",
     "Calibration",

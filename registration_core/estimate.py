@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from registration_core.algorithm import ALGORITHM
+
 Array = NDArray[np.float64]
 
 
@@ -53,7 +55,9 @@ class Estimate:
     ambiguities: tuple[Ambiguity, ...]
     """What the depth does not tell about the pose; other modes first."""
     seed: int
-    """`snap(..., rng=np.random.default_rng(seed))` with the same inputs gives this estimate again."""
+    """`snap(..., rng=np.random.default_rng(seed))` with the same inputs and `algorithm` gives it again."""
+    algorithm: str = ALGORITHM
+    """The hash of the numeric sources and fitted numbers that made it."""
 
 
 class WorldEstimate(Estimate):

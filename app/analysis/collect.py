@@ -46,6 +46,8 @@ class Collected:
     """Operators who did not withdraw, by group; 0 for a group of the plan that has none."""
     trials: Sequence[TrialTrace]
     truths: Sequence[PlaceTruth]
+    algorithm: str | None
+    """That computed the offline snaps; None where there are none, or an older version did not say."""
     remarks: Sequence[Remark]
 
 
@@ -72,8 +74,8 @@ def trials_of(database: Database, study_id: int, source: TruthSource = "operator
         snaps = snaps_of(session, study_id)
     remarks = [*about_participants(study, participants), *remarks]
     truths = _truths(runs, source, remarks)
-    trials = _trials(database, runs, truths, snaps, remarks)
-    remarks += about_snaps(trials, snaps)
+    trials = _trials(database, runs, truths, snaps.by_registration, remarks)
+    remarks += about_snaps(trials, snaps.algorithm)
     present = [participant.group for participant in participants if participant.withdrawn_at is None]
     return Collected(
         study_id=study_id,
@@ -84,6 +86,7 @@ def trials_of(database: Database, study_id: int, source: TruthSource = "operator
         },
         trials=trials,
         truths=list(truths.values()),
+        algorithm=snaps.algorithm,
         remarks=remarks,
     )
 

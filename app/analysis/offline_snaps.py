@@ -2,7 +2,8 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from app.analysis.logs import decoded_pose
 from app.analysis.remarks import Remark
 from app.analysis.trial import TrialTrace
 from app.tables import OfflineSnap, Participant, Registration
+from registration_core import ALGORITHM
 
 Array = NDArray[np.float64]
 
@@ -21,17 +23,18 @@ TICKS = 1e6
 ABOUT = "offline snaps"
 
 
-class StoredSnap(NamedTuple):
-    """What one snap came to."""
-
-    T_world_object: Sequence[Sequence[float]] | None
-    """(4, 4); None where it failed."""
-    version: str
-    """Of Snap6D, that computed it."""
+SnapsBySecond = Mapping[int, Sequence[Sequence[float]] | None]
+"""T_world_object (4, 4) of the snaps of a registration, by the second of the trace, in ticks; None where one
+failed."""
 
 
-SnapsBySecond = dict[int, StoredSnap]
-"""Of a registration, by the second of the trace, in ticks."""
+@dataclass(frozen=True)
+class StudySnaps:
+    """The offline snaps of a study, all of one algorithm: numbers of two are never mixed."""
+
+    by_registration: Mapping[int, SnapsBySecond]
+    algorithm: str | None
+    """That computed them; None where there are none, or an older version did not say."""
 
 
 class SnapsAt(NamedTuple):
@@ -45,36 +48,45 @@ class SnapsAt(NamedTuple):
     """Samples from which no snap was computed, which is another thing than one that failed."""
 
 
-def snaps_of(session: Session, study_id: int) -> dict[int, SnapsBySecond]:
-    """The offline snaps of a study by registration; of several from one pose the newest counts."""
+def snaps_of(session: Session, study_id: int) -> StudySnaps:
+    """The offline snaps of a study: of several from one pose the newest counts.
+
+    Where they are of several algorithms, those of the one that has most of them count, of the newest among
+    equals: so a report goes on as it was until a batch with a new algorithm is done.
+    """
     query = (
         select(
+            OfflineSnap.algorithm,
             OfflineSnap.registration_id,
             OfflineSnap.seconds,
             cast(OfflineSnap.T_world_object, Text),
-            OfflineSnap.version,
         )
         .join(Registration, OfflineSnap.registration_id == Registration.id)
         .join(Participant, Participant.user_id == Registration.user_id)
         .where(Participant.study_id == study_id)
         .order_by(OfflineSnap.id)
     )
-    snaps: dict[int, SnapsBySecond] = defaultdict(dict)
-    for registration_id, seconds, text, version in session.execute(query):
-        snaps[registration_id][round(TICKS * seconds)] = StoredSnap(decoded_pose(text), version)
-    return snaps
+    snaps: dict[str | None, dict[int, dict[int, Any]]] = defaultdict(lambda: defaultdict(dict))
+    newest: dict[str | None, int] = {}
+    for place, (algorithm, registration_id, seconds, text) in enumerate(session.execute(query)):
+        snaps[algorithm][registration_id][round(TICKS * seconds)] = decoded_pose(text)
+        newest[algorithm] = place
+    if not snaps:
+        return StudySnaps({}, None)
+    shown = max(newest, key=lambda one: (sum(map(len, snaps[one].values())), newest[one]))
+    return StudySnaps(snaps[shown], shown)
 
 
 def snaps_at(times: Array, snaps: SnapsBySecond) -> SnapsAt:
     """The snaps of a registration from its samples at times (M,) of the trace."""
-    stored = [snaps.get(tick) for tick in np.rint(TICKS * times).astype(np.int64).tolist()]
-    found = [(i, T) for i, one in enumerate(stored) if one is not None and (T := one[0]) is not None]
+    ticks = np.rint(TICKS * times).astype(np.int64).tolist()
+    found = [(i, T) for i, tick in enumerate(ticks) if (T := snaps.get(tick)) is not None]
     T_world_object = np.array([T for _, T in found]).reshape(-1, 4, 4)
-    return SnapsAt([i for i, _ in found], T_world_object, stored.count(None))
+    return SnapsAt([i for i, _ in found], T_world_object, sum(tick not in snaps for tick in ticks))
 
 
-def about_snaps(trials: Sequence[TrialTrace], snaps: Mapping[int, SnapsBySecond]) -> Iterator[Remark]:
-    """What is to be said of the snaps of the trials that count."""
+def about_snaps(trials: Sequence[TrialTrace], algorithm: str | None) -> Iterator[Remark]:
+    """What is to be said of the snaps of the trials that count, which this algorithm computed."""
     samples = sum(len(trial.seconds) for trial in trials)
     missing = sum(trial.missing_snaps for trial in trials)
     if missing == samples:
@@ -90,8 +102,10 @@ def about_snaps(trials: Sequence[TrialTrace], snaps: Mapping[int, SnapsBySecond]
     failed = computed - sum(int(np.isfinite(trial.stg_errors.translation).sum()) for trial in trials)
     if failed:
         yield Remark(ABOUT, f"{failed} of {computed} failed; they come within no margin")
-    of_trials = [snaps.get(trial.registration_id, {}) for trial in trials]
-    versions = sorted({snap.version for by_second in of_trials for snap in by_second.values()})
-    if len(versions) > 1:
-        text = f"they are of several versions of Snap6D, {', '.join(versions)}, and are shown as one"
+    if algorithm != ALGORITHM:
+        theirs = f"algorithm {algorithm}" if algorithm else "a version that did not name its algorithm"
+        text = (
+            f"they are of {theirs}, while this version has algorithm {ALGORITHM}; `snap6d study snap`"
+            f" computes them anew, and this report takes those once it has as many"
+        )
         yield Remark(ABOUT, text)

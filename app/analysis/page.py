@@ -222,9 +222,10 @@ def _off(errors: PoseErrors | None) -> str:
 
 
 def _method(report: Report) -> list[str]:
-    config = report.config
+    config, algorithm = report.config, report.collected.algorithm
+    by = f"; they are of algorithm {algorithm}" if algorithm else ""
     return [
-        f"Each offline snap is charged with {config.snap_seconds:g} s.",
+        f"Each offline snap is charged with {config.snap_seconds:g} s{by}.",
         "Idle time is left out." if config.without_idle else "Idle time counts.",
         "The ground truth of an object is the mean of the accurate registrations by hand."
         if config.truth == "operators"

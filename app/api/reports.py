@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from app.analysis.collect import TruthSource
 from app.analysis.curves import SNAP_SECONDS
@@ -64,6 +64,9 @@ class ReportOut(BaseModel):
     choices: dict[str, list[str]]
     groups: dict[str, int]
     config: ConfigOut
+    algorithm: str | None = Field(
+        description="That of the offline snaps; null where there are none, or an older version did not say."
+    )
     trials: int
     cells: list[CellOut]
     gains: list[GainOut]
@@ -135,6 +138,7 @@ def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
         choices=asked.choices,
         groups=dict(collected.groups),
         config=ConfigOut(**vars(report.config)),
+        algorithm=collected.algorithm,
         trials=len(collected.trials),
         cells=[cell_out(cell) for cell in report.cells if error in (None, cell.error)],
         gains=[gain_out(gain) for gain in report.gains if error in (None, gain.error)],

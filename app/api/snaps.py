@@ -101,6 +101,10 @@ class EstimateOut(BaseModel):
         description="Objects of the scene that the snap knew; null where an older version did not say."
     )
     version: str
+    algorithm: str | None = Field(
+        description="A hash of the sources and fitted numbers that computed it: with the same one, inputs "
+        "and seed the result is the same on one machine; null where an older version did not say."
+    )
     hardware: str
     seconds: float
     evaluations: int

@@ -80,8 +80,9 @@ class Dispatch:
         def ended(outcome: Proposals | SnapError) -> None:
             if isinstance(outcome, SnapError):
                 on_end(SnapFailure(str(outcome)))
-            else:
-                on_end(SearchResult(outcome.hypotheses, outcome.seconds, __version__, outcome.hardware))
+                return
+            made_by = __version__, outcome.algorithm, outcome.hardware
+            on_end(SearchResult(outcome.hypotheses, outcome.seconds, *made_by))
 
         return self._snapper.request(self._search_job(order), self._model, on_progress, ended)
 

@@ -38,6 +38,7 @@ class SearchResult:
     hypotheses: tuple[Hypothesis, ...]
     seconds: float
     version: str
+    algorithm: str
     hardware: str
 
 
@@ -159,6 +160,7 @@ def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> N
                 for candidate in outcome.hypotheses
             ],
             "version": outcome.version,
+            "algorithm": outcome.algorithm,
             "hardware": outcome.hardware,
         },
     )

@@ -141,6 +141,7 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         start_spread=stored_spread(order.start_spread),
         known_objects=stored_known(order.known),
         version=result.version,
+        algorithm=estimate.algorithm,
         hardware=result.hardware,
         seconds=estimate.seconds,
         evaluations=estimate.evaluations,

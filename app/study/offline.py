@@ -1,7 +1,7 @@
 """Offline snaps: what a snap gives from every pose that operators passed through, computed afterwards.
 
 The batch may be stopped at any time, by SIGKILL too, and started again: what is stored is not computed again,
-and the rest comes out the same, for a snap's seed hangs on its input alone.
+and the rest comes out the same, for a snap's seed depends on its input alone.
 """
 
 import uuid
@@ -22,7 +22,7 @@ from app.snapping import SnapError, Snapper
 from app.study.samples import Sample, samples_of
 from app.study.snap_batch import BatchResult, BatchStart, SnapBatch
 from app.study.snap_store import Outcome, SnapStore
-from registration_core import SnapConfig, pose
+from registration_core import ALGORITHM, SnapConfig, pose
 
 SNAPS_AT_ONCE = 16
 """In one job of a worker, which takes about a second then."""
@@ -81,7 +81,7 @@ class OfflineBatch:
             on_progress: Told how many samples have their snap, and of how many.
 
         Raises:
-            OfflineError: where the workers cannot be reached, or one of them died.
+            OfflineError: where the workers cannot be reached, one of them died, or one computes otherwise.
             StoreError: where another batch does the same.
         """
         total, missing = self._missing(registration_ids)
@@ -132,6 +132,11 @@ class OfflineBatch:
                 del under_way[snap_id]
                 if isinstance(result, SnapError):
                     raise OfflineError(f"{result} Start the batch again to go on.")
+                if result.algorithm != ALGORITHM:
+                    raise OfflineError(
+                        f"A worker computes with algorithm {result.algorithm}, this program with {ALGORITHM}."
+                        " Install the same version of Snap6D on both, and start the batch again."
+                    )
                 hand_over(1)
                 yield batch, result
         finally:
@@ -165,6 +170,7 @@ class OfflineBatch:
                 "snap_seconds": outcome.seconds,
                 "evaluations": outcome.evaluations,
                 "version": __version__,
+                "algorithm": result.algorithm,
                 "hardware": result.hardware,
             }
             for sample in samples:

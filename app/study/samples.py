@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app import __version__
 from app.analysis.runs import runs_of
 from app.analysis.trace import trace_of, until_submission
 from app.database import Database
 from app.event_log import EventLog
 from app.registration_rows import whole_registration
 from app.tables import Event, Frame, Object, Task
-from registration_core import SnapConfig
+from registration_core import ALGORITHM, SnapConfig
 
 Array = NDArray[np.float64]
 
@@ -34,7 +33,7 @@ class Sample:
     """(4, 4)."""
     view: "SampledView"
     input_hash: str
-    """Of all that a snap from there hangs on."""
+    """Of all that a snap from there depends on."""
 
     @property
     def seed(self) -> int:
@@ -49,7 +48,7 @@ class SampledView:
         self.object = item
         self.frame = frame
         content = [
-            __version__,
+            ALGORITHM,
             config.to_dict(),
             [item.mesh_hash, item.mesh_format, item.symmetries],
             [frame.depth_hash, frame.depth_scale, frame.fx, frame.fy, frame.cx, frame.cy],

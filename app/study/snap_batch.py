@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.worker import Job, Tell, hardware
-from registration_core import ObjectModel, snap
+from registration_core import ALGORITHM, ObjectModel, snap
 
 Array = NDArray[np.float64]
 
@@ -39,6 +39,8 @@ class BatchResult:
     """An outcome for each start, and what they were computed on."""
 
     outcomes: tuple[BatchOutcome, ...]
+    algorithm: str
+    """`registration_core.ALGORITHM` of the worker."""
     hardware: str
 
 
@@ -54,7 +56,7 @@ class SnapBatch(Job[BatchResult]):
         for number, start in enumerate(self.starts):
             tell(number / len(self.starts))
             outcomes.append(self._outcome(model, start))
-        return BatchResult(tuple(outcomes), hardware())
+        return BatchResult(tuple(outcomes), ALGORITHM, hardware())
 
     def _outcome(self, model: ObjectModel, start: BatchStart) -> BatchOutcome:
         began, rng = time.perf_counter(), np.random.default_rng(start.seed)

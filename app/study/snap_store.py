@@ -24,6 +24,7 @@ OUTCOME = (
     "snap_seconds",
     "evaluations",
     "version",
+    "algorithm",
     "hardware",
 )
 

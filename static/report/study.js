@@ -144,13 +144,13 @@ function truths({ truths: places }) {
   return rows.length ? section("Ground truth", tableOf(["object", "registrations", "spread", "off the reference"], rows)) : null;
 }
 
-function method({ config }) {
+function method({ config, algorithm }) {
   return section(
     "How the numbers are made",
     element(
       "p",
       {},
-      `Each offline snap is charged with ${config.snap_seconds} s. Idle time ${config.without_idle ? "is left out" : "counts"}. ` +
+      `Each offline snap is charged with ${config.snap_seconds} s${algorithm ? `; they are of algorithm ${algorithm}` : ""}. Idle time ${config.without_idle ? "is left out" : "counts"}. ` +
         `Intervals hold 95 %, by bootstrap over operators with seed ${config.seed}. Means are over operators who come within a margin.`,
     ),
   );

@@ -22,6 +22,7 @@ from app.tables import (
     Trial,
     User,
 )
+from registration_core import ALGORITHM
 from tests.app.analysis.hand_made import NOON, Entry, at, moved, view
 
 START = at(0.1, 1.0)
@@ -97,7 +98,10 @@ class HandMadeStudy:
             return write_log(session, task, participant.user_id, entries, state, skip_sequence)
 
     def snaps(
-        self, registration_id: int, results: dict[float, np.ndarray | None], version: str = "0"
+        self,
+        registration_id: int,
+        results: dict[float, np.ndarray | None],
+        algorithm: str | None = ALGORITHM,
     ) -> None:
         """Offline snaps by seconds of the trace; None is one that failed."""
         with self.database.write() as session:
@@ -106,13 +110,14 @@ class HandMadeStudy:
                     registration_id=registration_id,
                     seconds=seconds,
                     T_world_object_start=START.tolist(),
-                    input_hash=f"{seconds}",
+                    input_hash=f"{seconds} {algorithm}",
                     config={},
                     seed=1,
                     T_world_object=None if T is None else T.tolist(),
                     snap_seconds=0.01,
                     evaluations=1,
-                    version=version,
+                    version="0",
+                    algorithm=algorithm,
                     hardware="paper",
                 )
                 for seconds, T in results.items()

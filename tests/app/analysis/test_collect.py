@@ -11,6 +11,7 @@ from app.analysis.curves import MARGINS, Timing
 from app.config import Settings
 from app.database import Database
 from app.tables import utc_now
+from registration_core import ALGORITHM
 from tests.app.analysis.hand_made import Entry, at, moved, view
 from tests.app.analysis.hand_made_study import HandMadeStudy, every_half_second, two_moves
 
@@ -69,17 +70,26 @@ def test_snaps_are_put_beside_the_poses_that_they_began_from(database):
     assert trial.missing_snaps == 9 and "offline snaps: 9 of 11 sampled poses have none yet" in said(
         collected
     )
-    assert "versions" not in said(collected)
+    assert collected.algorithm == ALGORITHM and "algorithm" not in said(collected)
 
 
-def test_snaps_of_two_versions_are_not_taken_for_one_in_silence(database):
+def test_snaps_of_two_algorithms_are_never_mixed(database):
     study = HandMadeStudy(database)
     registration = study.trial(study.participant("P1"), two_moves(3.0, 6.0, at(0.0)))
     assert registration is not None
-    study.snaps(registration, every_half_second(6.0, at(0.0)), version="1")
-    assert said(trials_of(database, study.id)) == ""
-    study.snaps(registration, {1.0 + 1e-9: at(0.0)}, version="2")
-    assert "of several versions of Snap6D, 1, 2, and are shown as one" in said(trials_of(database, study.id))
+    study.snaps(registration, every_half_second(6.0, at(0.2)), algorithm=None)
+    before = trials_of(database, study.id)
+    assert before.algorithm is None and before.trials[0].stg_errors.translation == pytest.approx(0.2)
+    assert f"of a version that did not name its algorithm, while this version has algorithm {ALGORITHM};" in (
+        said(before)
+    )
+    study.snaps(registration, dict(list(every_half_second(6.0, at(0.0)).items())[:3]))
+    half_way = trials_of(database, study.id)
+    assert half_way.algorithm is None and half_way.trials[0].stg_errors.translation == pytest.approx(0.2)
+    study.snaps(registration, dict(list(every_half_second(6.0, at(0.0)).items())[3:]))
+    after = trials_of(database, study.id)
+    assert after.algorithm == ALGORITHM and after.trials[0].stg_errors.translation == pytest.approx(0.0)
+    assert said(after) == ""
 
 
 def test_whatever_is_left_out_is_said(database):

@@ -31,6 +31,7 @@ def collected_of(*trials, is_simulated=False) -> Collected:
         groups={"novice": 2, "expert": 0},
         trials=trials,
         truths=[PlaceTruth("table, mug", mean_truth(at(0.0)[None], np.eye(4)[None]), None)],
+        algorithm="0123456789ab",
         remarks=[Remark("group expert", "has no operators; there are no curves of it")],
     )
 

@@ -13,7 +13,7 @@ from app.api.snaps import INTERRUPTED
 from app.main import create_services
 from app.scene_data import camera_of
 from app.tables import Object
-from registration_core import SnapConfig, pose, snap
+from registration_core import ALGORITHM, SnapConfig, pose, snap
 from registration_core.pose_error import adi
 from tests.app.api.test_problems import full_disk
 from tests.app.conftest import settings_for
@@ -76,6 +76,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
         pytest.approx(a.axis) for a in expected.ambiguities
     ]
     assert (estimate["evaluations"], estimate["seed"]) == (expected.evaluations, 7)
+    assert estimate["algorithm"] == ALGORITHM
     assert SnapConfig.from_dict(estimate["config"]) == SnapConfig()
 
 

@@ -63,6 +63,7 @@ def fill(site: Site) -> int:
                     config={"particles": 625, "nested": {"a": 1}},
                     start_spread=[0.03, 0.35],
                     version="0.1.0",
+                    algorithm="0123456789ab",
                     hardware="a machine",
                     seconds=0.02,
                     evaluations=14000,
@@ -120,6 +121,7 @@ def test_an_estimate_has_what_repeats_it(site: Site, tmp_path: Path) -> None:
     fill(site)
     _, (estimate,) = written(site, tmp_path / "log")
     assert (estimate["image_id"], estimate["seed"], estimate["version"]) == (5, 2**40, "0.1.0")
+    assert estimate["algorithm"] == "0123456789ab"
     assert estimate["config"] == {"particles": 625, "nested": {"a": 1}}
     assert estimate["start_spread"] == [0.03, 0.35]
     assert estimate["T_world_object_start"] == BEFORE

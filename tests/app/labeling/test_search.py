@@ -11,7 +11,7 @@ from registration_core import Hypothesis, SnapConfig
 from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted
 
 FOUND = SearchResult(
-    (Hypothesis(START, 0.75), Hypothesis(shifted(0.1), 0.25)), 0.2, "1.2.3", "a test machine"
+    (Hypothesis(START, 0.75), Hypothesis(shifted(0.1), 0.25)), 0.2, "1.2.3", "0123456789ab", "a test machine"
 )
 
 

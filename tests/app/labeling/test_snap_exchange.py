@@ -8,7 +8,7 @@ import pytest
 from app.auth import Actor
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
-from registration_core import SnapConfig
+from registration_core import ALGORITHM, SnapConfig
 from tests.app.labeling.bench import FRAMES, PIVOT, START, Bench, result, shifted
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
@@ -41,6 +41,7 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     (row,) = bench.log.estimates
     assert (row.snap_id, row.registration_id, row.frame_id, row.seed) == (snap_id, 7, FRAMES[0], 42)
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
+    assert row.algorithm == ALGORITHM
     assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
     (ambiguity,) = row.ambiguities

@@ -1,5 +1,7 @@
 """Offline snaps of registrations made by hand, on real workers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from sqlalchemy import select
@@ -17,7 +19,7 @@ from app.study.samples import samples_of
 from app.study.simulated_operator import SimulatedClock
 from app.study.snap_store import SnapStore, StoreError
 from app.tables import OfflineSnap, utc_now
-from registration_core import SnapConfig, pose, snap
+from registration_core import ALGORITHM, SnapConfig, pose, snap
 from tests.app.small_dataset import TOOL, true_pose
 
 STEPS = (0.06, 0.03, 0.015, 0.0)
@@ -173,6 +175,28 @@ def test_workers_that_cannot_be_reached_end_the_batch(made, monkeypatch):
             made.run(registration_id)
     assert not made.rows(registration_id)
     assert made.run(registration_id).computed == 1
+
+
+def test_a_worker_that_computes_otherwise_ends_the_batch(made, monkeypatch):
+    registration_id = made.register("ann", beside(0.02))
+    request = made.services.snapper.request
+
+    def otherwise(job, model, on_progress, on_end, priority):
+        return request(
+            job,
+            model,
+            on_progress,
+            lambda result: on_end(replace(result, algorithm="0123456789ab")),
+            priority,
+        )
+
+    with monkeypatch.context() as patched:
+        patched.setattr(made.services.snapper, "request", otherwise)
+        with pytest.raises(OfflineError, match="algorithm 0123456789ab, this program with"):
+            made.run(registration_id)
+    assert not made.rows(registration_id)
+    made.run(registration_id)
+    assert {row.algorithm for row in made.rows(registration_id)} == {ALGORITHM}
 
 
 def test_two_batches_at_once_are_said(made):
