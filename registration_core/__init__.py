@@ -14,7 +14,7 @@ from registration_core.snap import snap, snap_steps
 from registration_core.snap_config import SnapConfig
 from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
 from registration_core.symmetry_search import find_symmetries
-from registration_core.views import snap_views
+from registration_core.views import snap_views, snap_views_steps
 
 __all__ = [
     "ALGORITHM",
@@ -42,5 +42,6 @@ __all__ = [
     "snap",
     "snap_steps",
     "snap_views",
+    "snap_views_steps",
     "warm_up",
 ]

@@ -1,6 +1,5 @@
 """Likely poses of an object anywhere in a depth image, without a human start."""
 
-import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,17 +7,16 @@ from numpy.typing import ArrayLike
 
 from registration_core.agreement import Prior, surface_of
 from registration_core.camera import Intrinsics
-from registration_core.confidence import grouped
 from registration_core.estimate import Hypothesis
-from registration_core.kernels import from_rows, to_rows
+from registration_core.kernels import to_rows
 from registration_core.object_model import ObjectModel
 from registration_core.observation import FARTHEST, observe_region
 from registration_core.problem import Problem, checked_depth
 from registration_core.proposals import anywhere
 from registration_core.search import Search, ranked
 from registration_core.seeding import seed_of
-from registration_core.selection import match_shares, scores
 from registration_core.snap_config import SnapConfig
+from registration_core.verdict import found_anywhere
 from registration_core.viewpoint_model import viewpoint_model
 
 MOST = 10
@@ -54,8 +52,7 @@ def propose(
     image = checked_depth(depth, camera)
     left, top, right, bottom = checked_region(region, camera)
     known = viewpoint_model(model)
-    seed = seed_of(rng)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed_of(rng))
     part = image[top:bottom, left:right]
     measured = part[(part > 0) & (part < FARTHEST)]
     if not len(measured):
@@ -72,19 +69,11 @@ def propose(
     start[2, 3] = distance
     prior = Prior(to_rows(start)[0], NO_PRIOR, NO_PRIOR)
     problem = Problem(known, image, camera, start, start, prior, prior, config)
-    search = Search(problem, observation, surface, rng, seed, time.perf_counter())
+    search = Search(problem, observation, surface, rng)
     found, agreement = ranked(poses, search.weighed(poses), config.anywhere.kept)
     for stage in config.anywhere.stages:
         found, agreement = search.refined(found, agreement, stage)
-    counts = search.evidence(found)
-    seen = match_shares(counts) >= config.selection.min_match
-    if not seen.any():
-        return ()
-    found, counts = found[seen], counts[seen]
-    values = scores(counts, np.zeros(len(found)), config.selection) / config.confidence.temperature
-    modes, masses = grouped(found, int(np.argmax(values)), values, known, config.confidence)
-    best = [problem.uncentred(T) for T in from_rows(found[modes[:MOST]])]
-    return tuple(Hypothesis(T, float(mass)) for T, mass in zip(best, masses, strict=False))
+    return found_anywhere(problem, found, search.evidence(found), MOST)
 
 
 def checked_region(region: Sequence[int] | None, camera: Intrinsics) -> tuple[int, int, int, int]:

@@ -1,4 +1,4 @@
-"""One snap under way: what it works on, and the moves of the fast method."""
+"""The search in one view: what it works on, and the moves of the fast method."""
 
 import dataclasses
 from collections.abc import Iterator
@@ -7,22 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core.agreement import Prior, Surface, agreement_weights, sparse_agreement
+from registration_core.agreement import Prior, Surface, agreement_weights, sparse_agreement, surface_of
 from registration_core.evidence import evidence
 from registration_core.kernels import Array32, f4
 from registration_core.modes import distinct, move_to_nearest_twin
-from registration_core.observation import Observation
-from registration_core.polish import FINAL_TUKEY, polish, systems
+from registration_core.observation import Observation, observe
+from registration_core.polish import polish, systems
 from registration_core.problem import Problem
 from registration_core.proposals import around_start
 from registration_core.snap_config import StageConfig
 
 Array = NDArray[np.float64]
-
-NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
-"""Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
-NEAR_ITERATIONS = 14
-"""Steps of each of them."""
 
 SHOWN = 625
 """Proposals that are shown as progress, at most."""
@@ -30,17 +25,19 @@ SHOWN = 625
 
 @dataclass(eq=False)
 class Search:
-    """Everything that the steps of one snap share."""
+    """What a view shows of the object, and where it is looked for."""
 
     problem: Problem
     observation: Observation
     surface: Surface
     rng: np.random.Generator
-    seed: int
-    started: float
-    """`time.perf_counter()` at the start."""
     evaluations: int = 0
     """Hypotheses compared with the image so far."""
+
+    @property
+    def sees_enough(self) -> bool:
+        """Whether there are measurements to register to."""
+        return self.observation.measured >= self.problem.config.observation.min_pixels
 
     def round(self, share: float = 1.0, widening: float = 1.0) -> Iterator[Array32]:
         """Proposals, and then the modes (N, 3, 4) that every stage leaves, best first.
@@ -91,31 +88,22 @@ class Search:
         ring = self.surface.ring.shape[2]
         return ranked(poses, self._agreement(poses, stage.points, ring, stage.epsilon, 1.0, True), len(poses))
 
-    def polished_start(self) -> Array32:
-        """The operator's pose polished with kernels of several widths (3, 3, 4): the near candidates."""
-        start = self.problem.prior.start[None]
-        points = self._at_most(self.surface.points.shape[2])
-        self.evaluations += NEAR_ITERATIONS * len(NEAR_TUKEY)
-        return np.concatenate(
-            [
-                polish(
-                    start, self.surface, self.observation.grid, self.problem.model.radius, points,
-                    NEAR_ITERATIONS, tukey,
-                )
-                for tukey in NEAR_TUKEY
-            ]
-        )  # fmt: skip
+    def polished(self, poses: Array32, iterations: int, tukey: tuple[float, float]) -> Array32:
+        """Poses (N, 3, 4) after steps with all surface points; see `polish`."""
+        self.evaluations += iterations * len(poses)
+        points, radius = self.surface.points.shape[2], self.problem.model.radius
+        return polish(poses, self.surface, self.observation.grid, radius, points, iterations, tukey)
+
+    def systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
+        """The normal equations of poses (N, 3, 4) with all surface points; see `polish.systems`."""
+        points, radius = self.surface.points.shape[2], self.problem.model.radius
+        return systems(poses, self.surface, self.observation.grid, radius, points, tukey)
 
     def evidence(self, poses: Array32) -> Array:
         """What the pixels say of poses (N, 3, 4): (N, COUNT)."""
         self.evaluations += len(poses)
         distance = float(self.problem.start[2, 3])
         return evidence(poses, self.problem.model, self.observation.grid, distance)
-
-    def hessian(self, T: Array32) -> Array:
-        """How firmly the depth holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""
-        points, radius = self.surface.points.shape[2], self.problem.model.radius
-        return systems(T[None], self.surface, self.observation.grid, radius, points, FINAL_TUKEY)[0][0]
 
     def _at_most(self, points: int) -> int:
         return min(points, self.surface.points.shape[2])
@@ -130,6 +118,15 @@ class Search:
         )  # fmt: skip
         self.evaluations += len(poses)
         return agreement
+
+
+def search_of(problem: Problem, rng: np.random.Generator) -> Search:
+    """The search for what a problem asks for, its depth image read around the start."""
+    observation = observe(
+        problem.depth, problem.camera, problem.start[:3, 3], problem.model, problem.config.observation, rng,
+        problem.explained,
+    )  # fmt: skip
+    return Search(problem, observation, surface_of(problem.model), rng)
 
 
 def ranked(poses: Array32, scores: Array32, most: int) -> tuple[Array32, Array32]:

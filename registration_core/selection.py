@@ -28,25 +28,28 @@ class Judgement:
 
     winner: int
     scores: Array
-    """(N,), natural logarithm of odds."""
+    """(N,), natural logarithm of odds, of all views together."""
     counts: Array
-    """(N, evidence.COUNT), pixels of each class over the mean silhouette area at the start's depth."""
-
-    @property
-    def of_winner(self) -> tuple[float, Array]:
-        """Its score and its counts (evidence.COUNT,)."""
-        return float(self.scores[self.winner]), self.counts[self.winner]
+    """(N, evidence.COUNT), pixels of each class over the mean silhouette area at the start's depth, as a view
+    has them on average."""
+    of_winner: tuple[float, Array]
+    """Its score in a view on average, and its counts (evidence.COUNT,)."""
 
 
-def judge(candidates: Array32, counts: Array, near: int, prior: Prior, config: SelectionConfig) -> Judgement:
+def judge(
+    candidates: Array32, counts: Array, near: int, prior: Prior, config: SelectionConfig, views: int = 1
+) -> Judgement:
     """Choose among poses (N, 3, 4): the start first, then `near` polishes of it, then the modes found
     elsewhere.
 
     Args:
-        counts: (N, evidence.COUNT), their evidence.
+        counts: (N, evidence.COUNT), their evidence, summed over so many views.
     """
-    values = scores(counts, heavy_tails(candidates, prior), config)
-    return Judgement(chosen(values, near, leads(candidates, counts[0], config)), values, counts)
+    tails = heavy_tails(candidates, prior)
+    values, average = scores(counts, tails, config), counts / views
+    winner = chosen(values, near, leads(candidates, average[0], config))
+    of_winner = float(scores(average, tails, config)[winner]), average[winner]
+    return Judgement(winner, values, average, of_winner)
 
 
 def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:

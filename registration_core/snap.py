@@ -12,20 +12,19 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from registration_core.agreement import surface_of
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, SnapStep
 from registration_core.kernels import to_rows
 from registration_core.likelihood import RenderedLikelihood
 from registration_core.object_model import ObjectModel
-from registration_core.observation import observe
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
-from registration_core.report import certainty, judged, nothing_seen, outcome, progress, verdict
-from registration_core.search import Search
+from registration_core.search import search_of
 from registration_core.seeding import seed_of
-from registration_core.selection import is_settled, judge
+from registration_core.selection import is_settled
 from registration_core.snap_config import SnapConfig
+from registration_core.snap_run import Sighting, SnapRun
+from registration_core.verdict import certainty, judged, nothing_seen, outcome, progress, verdict
 
 
 def snap(
@@ -78,45 +77,47 @@ def snap_steps(
     problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread, explained)
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
-    observation = observe(
-        problem.depth, camera, problem.start[:3, 3], problem.model, config.observation, rng,
-        problem.explained,
-    )  # fmt: skip
-    search = Search(problem, observation, surface_of(problem.model), rng, seed, started)
-    if observation.measured < config.observation.min_pixels:
-        return iter([nothing_seen(search, 1)])
-    return _filter_steps(search) if config.method == "particle_filter" else _viewpoint_steps(search)
+    return steps_of(SnapRun((Sighting(search_of(problem, rng), np.eye(4)),), seed, started))
 
 
-def _viewpoint_steps(search: Search) -> Iterator[SnapStep]:
+def steps_of(run: SnapRun) -> Iterator[SnapStep]:
+    """The steps of a run by the method that its configuration asks for."""
+    if not run.sightings[0].search.sees_enough:
+        return iter([nothing_seen(run, 1)])
+    is_filter = run.problem.config.method == "particle_filter"
+    return _filter_steps(run) if is_filter else _viewpoint_steps(run)
+
+
+def _viewpoint_steps(run: SnapRun) -> Iterator[SnapStep]:
     """The fast method: polish the start; until a candidate stands out, propose, anneal and polish ever fewer
     modes, and choose among all that were found.
     """
-    config = search.problem.config
+    config = run.problem.config
     iterations = 2 + len(config.rounds) * (1 + len(config.stages))
-    candidates = np.concatenate([search.problem.prior.start[None], search.polished_start()])
-    near, counts = len(candidates) - 1, search.evidence(candidates)
-    judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
+    candidates = np.concatenate([run.problem.prior.start[None], run.polished_start()])
+    counts = run.evidence(candidates)
+    judgement = run.judge(candidates, counts)
     if is_settled(judgement, candidates, config.selection):
-        yield verdict(search, 1, candidates, judgement)
+        yield verdict(run, 1, candidates, judgement)
         return
     iteration, best, known = 1, candidates[[judgement.winner]], judgement.of_winner
-    yield progress(search, iteration, iterations, best, *known)
+    yield progress(run, iteration, iterations, best, *known)
     for one in config.rounds:
-        if certainty(search, candidates, judgement) > one.doubt:
+        if certainty(run, candidates, judgement) > one.doubt:
             continue
-        for poses in search.round(one.share, one.widening):
+        for poses in run.round(one.share, one.widening):
             iteration += 1
-            yield progress(search, iteration, iterations, np.concatenate([best, poses]), *known)
+            yield progress(run, iteration, iterations, np.concatenate([best, poses]), *known)
         candidates = np.concatenate([candidates, poses])
-        counts = np.concatenate([counts, search.evidence(poses)])
-        judgement = judge(candidates, counts, near, search.problem.prior, config.selection)
+        counts = np.concatenate([counts, run.evidence(poses)])
+        judgement = run.judge(candidates, counts)
         best, known = candidates[[judgement.winner]], judgement.of_winner
-    yield verdict(search, iteration + 1, candidates, judgement)
+    yield verdict(run, iteration + 1, candidates, judgement)
 
 
-def _filter_steps(search: Search) -> Iterator[SnapStep]:
+def _filter_steps(run: SnapRun) -> Iterator[SnapStep]:
     """The paper's method: importance resampling of particles weighed by Eq. 3 to 5."""
+    search = run.sightings[0].search
     problem, config = search.problem, search.problem.config.particle_filter
     depth = problem.depth if problem.explained is None else np.where(problem.explained, 0.0, problem.depth)
     likelihood = RenderedLikelihood(
@@ -133,6 +134,6 @@ def _filter_steps(search: Search) -> Iterator[SnapStep]:
         order = np.argsort(-particles.log_weights, kind="stable")
         ranked = to_rows(particles.poses[order])
         if iteration < config.iterations:
-            yield progress(search, iteration, config.iterations, ranked, *judged(search, ranked[0]))
+            yield progress(run, iteration, config.iterations, ranked, *judged(run, ranked[0]))
         else:
-            yield outcome(search, iteration, ranked, particles.log_weights[order])
+            yield outcome(run, iteration, ranked, particles.log_weights[order])

@@ -12,12 +12,11 @@ from benchmarks.registration import peers, prototype
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
 from registration_core import SnapConfig, snap, warm_up
-from registration_core.agreement import surface_of
 from registration_core.kernels import from_rows
-from registration_core.observation import observe
 from registration_core.problem import checked_problem
-from registration_core.search import Search
+from registration_core.search import search_of
 from registration_core.snap_config import ParticleFilterConfig
+from registration_core.snap_run import Sighting, SnapRun
 
 Array = NDArray[np.float64]
 
@@ -84,12 +83,8 @@ def polished_truth(instance: Instance) -> Array:
     problem = checked_problem(
         instance.model, instance.depth, instance.camera, instance.truth, SnapConfig(), None
     )
-    rng = np.random.default_rng(0)
-    observation = observe(
-        problem.depth, problem.camera, problem.start[:3, 3], problem.model, problem.config.observation, rng
-    )
-    search = Search(problem, observation, surface_of(problem.model), rng, 0, 0.0)
-    return problem.uncentred(from_rows(search.polished_start()[-1:])[0])
+    run = SnapRun((Sighting(search_of(problem, np.random.default_rng(0)), np.eye(4)),), 0, 0.0)
+    return problem.uncentred(from_rows(run.polished_start()[-1:])[0])
 
 
 @cache

@@ -4,10 +4,8 @@ import numpy as np
 import pytest
 
 from registration_core import SnapConfig, pose
-from registration_core.agreement import surface_of
-from registration_core.observation import observe
 from registration_core.problem import checked_problem
-from registration_core.search import SHOWN, Search, ranked
+from registration_core.search import SHOWN, Search, ranked, search_of
 from tests.registration_core.simple_scene import standing_tool
 
 
@@ -16,11 +14,7 @@ def search(spread=None, config=None) -> Search:
     scene, config = standing_tool(), config or SnapConfig()
     start = pose.perturbed(scene.truth, 0.03, np.radians(20), np.random.default_rng(0))
     problem = checked_problem(scene.model, scene.depth, scene.camera, start, config, spread)
-    rng = np.random.default_rng(0)
-    observation = observe(
-        problem.depth, scene.camera, problem.start[:3, 3], problem.model, config.observation, rng
-    )
-    return Search(problem, observation, surface_of(problem.model), rng, 0, 0.0)
+    return search_of(problem, np.random.default_rng(0))
 
 
 def test_ranked_are_the_best_in_order_and_ties_keep_theirs() -> None:

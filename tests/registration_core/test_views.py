@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from registration_core import SnapConfig, pose, snap_views
+from registration_core import SnapConfig, pose, snap, snap_views, snap_views_steps
 from registration_core.estimate import WorldEstimate
 from registration_core.rasterizer import render_depth
 from tests.registration_core.simple_scene import CAMERA, block, model_of, nearest, noisy, tool
@@ -64,6 +64,55 @@ def test_same_seed_same_estimate(views) -> None:
     assert first.seed == again.seed == 0
 
 
+def test_one_view_is_a_snap(views) -> None:
+    depth, camera, T_world_camera = views[0]
+    start = pose.perturbed(T_WORLD_OBJECT, 0.03, 0.3, np.random.default_rng(1))
+    T_start = pose.inverse(T_world_camera) @ start
+    one = snap(tool(), depth, camera, T_start, rng=np.random.default_rng(0))
+    here = run([(depth, camera, np.eye(4))], T_start)
+    np.testing.assert_array_equal(here.T_camera_object, one.T_camera_object)
+    np.testing.assert_array_equal(here.covariance, one.covariance)
+    assert (here.confidence, here.evaluations) == (one.confidence, one.evaluations)
+    there = run(views[:1], start)
+    np.testing.assert_allclose(there.T_world_object, T_world_camera @ one.T_camera_object, atol=1e-12)
+    turn = np.kron(np.eye(2), T_world_camera[:3, :3])
+    np.testing.assert_allclose(there.covariance, turn @ one.covariance @ turn.T, atol=1e-12)
+
+
+def test_steps_lead_to_the_estimate_in_the_world(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.06, np.radians(40), np.random.default_rng(0))
+    steps = list(snap_views_steps(tool(), views, start, rng=np.random.default_rng(0)))
+    assert len(steps) > 2
+    assert [step.iteration for step in steps] == list(range(1, len(steps) + 1))
+    assert all(step.iteration <= step.iterations for step in steps)
+    assert all(step.estimate is None for step in steps[:-1])
+    for step in steps:
+        np.testing.assert_allclose(step.particles[0], step.T_camera_object, atol=1e-6)
+        assert pose.distance(step.T_camera_object, T_WORLD_OBJECT).translation < 0.07
+    np.testing.assert_array_equal(steps[-1].estimate.T_world_object, run(views, start).T_world_object)
+
+
+def test_nothing_is_looked_for_where_the_start_fits_in_all_views(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.003, np.radians(2), np.random.default_rng(0))
+    (only,) = snap_views_steps(tool(), views, start, rng=np.random.default_rng(0))
+    assert pose.distance(only.estimate.T_world_object, T_WORLD_OBJECT).translation < 0.003
+
+
+def test_known_objects_are_left_out_of_the_view_that_shows_them(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.02, 0.2, np.random.default_rng(2))
+    everything = np.ones(views[1][0].shape, dtype=bool)
+    with_it = run(views[:2], start, explained=[None, everything])
+    np.testing.assert_array_equal(with_it.T_world_object, run(views[:1], start).T_world_object)
+
+
+def test_far_from_the_origin_of_the_world_is_as_exact(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.03, 0.3, np.random.default_rng(1))
+    away = pose.exp([4e5, -5e6, 300.0, 0.0, 0.0, 1.0])
+    moved = [(depth, camera, away @ T) for depth, camera, T in views]
+    estimate = run(moved, away @ start)
+    assert pose.distance(estimate.T_world_object, away @ T_WORLD_OBJECT).translation < 0.003
+
+
 def test_views_that_do_not_show_the_object_are_left_out(views) -> None:
     start = pose.perturbed(T_WORLD_OBJECT, 0.02, 0.2, np.random.default_rng(2))
     depth, camera, T_world_camera = views[1]
@@ -90,6 +139,9 @@ def test_bad_input_is_named(views) -> None:
         (T_WORLD_OBJECT, [(depth, camera, 2.0 * T)], {}, r"views\[0\]: T_world_camera must"),
         (outside, [(depth, camera, T)], {}, "T_world_object puts the object wholly outside"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"config": SnapConfig.paper()}, "config.method must"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": []}, "explained must hold"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth > 0.5, None]}, "explained must hold"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth]}, r"views\[0\]: explained must be"),
     ):
         with pytest.raises(ValueError, match=message):
             run(given, start, **options)

@@ -1,0 +1,143 @@
+"""One snap under way, in one view or in several at once.
+
+Poses are those in the first view's camera: with one view the run is that view's search, and with several
+every other view sees the same poses from where its camera stands. What the views say is added up.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from registration_core import pose, selection
+from registration_core.kernels import Array32, from_rows, to_rows
+from registration_core.modes import distinct, move_to_nearest_twin
+from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
+from registration_core.problem import Problem
+from registration_core.search import Search
+from registration_core.selection import Judgement, match_shares
+
+Array = NDArray[np.float64]
+
+NEAR_TUKEY = ((0.03, 0.004), (0.015, 0.004), (0.008, 0.003))
+"""Widths of the robust kernel, first and last step, of the polishes from the start itself, metres."""
+NEAR_ITERATIONS = 14
+"""Steps of each of them."""
+
+JOINT_ITERATIONS, JOINT_TUKEY = 10, (0.015, 0.004)
+"""Steps of the joint polish of a mode that one view has found, and widths of its robust kernel, metres."""
+JOINT_NICHE = (0.003, 0.05)
+"""Modes closer than this are one, metres and radians."""
+JOINT_MODES = 32
+"""Modes of one round that are judged by all views."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """A view that shows the object, and the search in it."""
+
+    search: Search
+    T_camera_first: Array
+    """(4, 4), from the axes of the first view's camera."""
+
+    def seen(self, poses: Array32) -> Array32:
+        """Poses (N, 3, 4) in the first camera, in this one."""
+        return to_rows(self.T_camera_first @ from_rows(poses))
+
+    def found(self, poses: Array32) -> Array32:
+        """Poses (N, 3, 4) in this camera, in the first one."""
+        return to_rows(pose.inverse(self.T_camera_first) @ from_rows(poses))
+
+    def systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
+        """`Search.systems` of poses (N, 3, 4) in the first camera, in its axes."""
+        hessians, sides, weights = self.search.systems(self.seen(poses), tukey)
+        to_first = np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
+        return to_first @ hessians @ to_first.T, sides @ to_first.T, weights
+
+
+@dataclass(frozen=True, eq=False)
+class SnapRun:
+    """Everything that the steps of one snap share."""
+
+    sightings: tuple[Sighting, ...]
+    """At least one; the first view's problem is the snap's."""
+    seed: int
+    started: float
+    """`time.perf_counter()` at the start."""
+
+    @property
+    def problem(self) -> Problem:
+        """What is sought and from where, in the first camera."""
+        return self.sightings[0].search.problem
+
+    @property
+    def evaluations(self) -> int:
+        """Hypotheses compared with an image so far."""
+        return sum(sighting.search.evaluations for sighting in self.sightings)
+
+    def polished_start(self) -> Array32:
+        """The operator's pose polished with kernels of several widths (3, 3, 4): the near candidates."""
+        start = self.problem.prior.start[None]
+        return np.concatenate([self._polished(start, NEAR_ITERATIONS, tukey) for tukey in NEAR_TUKEY])
+
+    def round(self, share: float, widening: float) -> Iterator[Array32]:
+        """`Search.round` in every view, side by side; what all stages leave is polished by all views."""
+        if len(self.sightings) == 1:
+            yield from self.sightings[0].search.round(share, widening)
+            return
+        rounds = [sighting.search.round(share / len(self.sightings), widening) for sighting in self.sightings]
+        for stage, parts in enumerate(zip(*rounds, strict=True)):
+            views = zip(self.sightings, parts, strict=True)
+            poses = np.concatenate([sighting.found(part) for sighting, part in views])
+            yield self._joined(poses) if stage == len(self.problem.config.stages) else poses
+
+    def judge(self, candidates: Array32, counts: Array) -> Judgement:
+        """Choose among poses (N, 3, 4), of evidence (N, COUNT): the start, its polishes, and other modes."""
+        config = self.problem.config.selection
+        return selection.judge(
+            candidates, counts, len(NEAR_TUKEY), self.problem.prior, config, len(self.sightings)
+        )
+
+    def evidence(self, poses: Array32) -> Array:
+        """What the pixels of all views together say of poses (N, 3, 4): (N, COUNT)."""
+        return np.sum([one.search.evidence(one.seen(poses)) for one in self.sightings], axis=0)
+
+    def hessian(self, T: Array32) -> Array:
+        """How firmly the depth of all views holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""
+        return self._systems(T[None], FINAL_TUKEY)[0][0]
+
+    def _systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
+        parts = [sighting.systems(poses, tukey) for sighting in self.sightings]
+        hessians, sides, weights = (np.sum(part, axis=0) for part in zip(*parts, strict=True))
+        return hessians, sides, weights
+
+    def _joined(self, poses: Array32) -> Array32:
+        """The distinct modes among poses (N, 3, 4) that single views have found, polished by all of them."""
+        move_to_nearest_twin(poses, self.problem.model.symmetries, self.problem.prior.start)
+        poses = self._polished(poses, JOINT_ITERATIONS, JOINT_TUKEY)
+        agreement = match_shares(self.evidence(poses) / len(self.sightings)).astype(np.float32)
+        return poses[distinct(poses, agreement, JOINT_MODES, *JOINT_NICHE)]
+
+    def _polished(self, poses: Array32, iterations: int, tukey: tuple[float, float]) -> Array32:
+        """Poses (N, 3, 4) after Gauss-Newton steps on the normal equations of all views together; Tukey's
+        kernel goes from a width of tukey[0] to tukey[1], metres.
+        """
+        if len(self.sightings) == 1:
+            return self.sightings[0].search.polished(poses, iterations, tukey)
+        search = self.sightings[0].search
+        points, radius = search.surface.points.shape[2], search.problem.model.radius
+        T = from_rows(poses)
+        for width in np.geomspace(*tukey, iterations):
+            hessians, sides, weights = self._systems(to_rows(T), width)
+            held = weights > MIN_WEIGHT * points
+            damped = hessians + (DAMPING * weights[:, None] + 1e-9)[:, :, None] * np.eye(6)
+            steps = np.linalg.solve(damped, sides[:, :, None])[:, :, 0] * held[:, None]
+            steps[:, 3:] /= radius
+            lengths = [np.linalg.norm(part, axis=1) for part in (steps[:, :3], steps[:, 3:])]
+            sizes = np.stack(lengths, axis=1)
+            steps *= np.minimum(1.0, np.array(MAX_STEP) / (sizes + 1e-9)).min(axis=1)[:, None]
+            T[:, :3, 3] += steps[:, :3]
+            T[:, :3, :3] = Rotation.from_rotvec(steps[:, 3:]).as_matrix() @ T[:, :3, :3]
+        return to_rows(T)
