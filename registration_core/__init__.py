@@ -3,6 +3,7 @@
 from registration_core.acceptance import NEVER, Calibration, acceptance, calibration_of
 from registration_core.algorithm import ALGORITHM
 from registration_core.camera import Intrinsics
+from registration_core.certificates import Certificates, Check
 from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Ambiguity, Estimate, Hypothesis, SnapStep, WorldEstimate
@@ -21,6 +22,8 @@ __all__ = [
     "NEVER",
     "Ambiguity",
     "Calibration",
+    "Certificates",
+    "Check",
     "Correspondence",
     "Estimate",
     "Hypothesis",

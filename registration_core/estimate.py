@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.algorithm import ALGORITHM
+from registration_core.certificates import Certificates
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,8 @@ class Estimate:
     """Whether the search settled: False where there was too little evidence to go on."""
     ambiguities: tuple[Ambiguity, ...]
     """What the depth does not tell about the pose; other modes first."""
+    certificates: Certificates
+    """What speaks for the pose beside the confidence."""
     seed: int
     """`snap(..., rng=np.random.default_rng(seed))` with the same inputs and `algorithm` gives it again."""
     algorithm: str = ALGORITHM

@@ -47,6 +47,8 @@ class Observation:
     grid: Grid
     measured: int
     """Pixels of the grid with depth within reach of the object, but for those of known objects."""
+    block: int
+    """Pixels of the image along an edge of one of the grid's."""
 
 
 def window(
@@ -144,12 +146,13 @@ def observe_region(
         _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
     weight[known] = f4(0)
     near = np.abs(reduced - distance) < model.radius + config.reach
-    return Observation(grid, int(np.count_nonzero(near & (unknown.depth > 0))))
+    return Observation(grid, int(np.count_nonzero(near & (unknown.depth > 0))), block)
 
 
-def is_held_out(rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether a snap leaves these pixels unread wherever it reduces the image: every other one, as on a
-    checkerboard. Its result can be checked by them.
+@njit(**FAST)
+def is_held_out(rows, columns):
+    """Whether a snap leaves a pixel, or each of some, unread wherever it reduces the image: every other one,
+    as on a checkerboard. Its result can be checked by them.
     """
     return (rows + columns) % 2 == 1
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.agreement import Prior, Surface, agreement_weights, sparse_agreement, surface_of
+from registration_core.certificates import NOTHING, Check, checked_by
 from registration_core.evidence import evidence
 from registration_core.kernels import Array32, f4
 from registration_core.modes import distinct, move_to_nearest_twin
@@ -93,6 +94,13 @@ class Search:
         self.evaluations += iterations * len(poses)
         points, radius = self.surface.points.shape[2], self.problem.model.radius
         return polish(poses, self.surface, self.observation.grid, radius, points, iterations, tukey)
+
+    def check(self, T: Array) -> Check:
+        """What the pixels that this search left unread say of a pose `T_camera_centre` (4, 4)."""
+        problem = self.problem
+        if self.observation.block == 1 or problem.config.method != "viewpoint":
+            return NOTHING
+        return checked_by(problem.depth, problem.camera, problem.model, T, True, problem.explained)
 
     def systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
         """The normal equations of poses (N, 3, 4) with all surface points; see `polish.systems`."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from registration_core import pose, selection
+from registration_core.certificates import Check
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
@@ -103,6 +104,10 @@ class SnapRun:
     def evidence(self, poses: Array32) -> Array:
         """What the pixels of all views together say of poses (N, 3, 4): (N, COUNT)."""
         return np.sum([one.search.evidence(one.seen(poses)) for one in self.sightings], axis=0)
+
+    def checks(self, T: Array32) -> list[Check]:
+        """What the pixels that each view's search left unread say of a pose (3, 4)."""
+        return [one.search.check(from_rows(one.seen(T[None]))[0]) for one in self.sightings]
 
     def hessian(self, T: Array32) -> Array:
         """How firmly the depth of all views holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""

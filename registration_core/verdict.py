@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from registration_core.agreement import heavy_tails
 from registration_core.ambiguity import ambiguities
+from registration_core.certificates import certified
 from registration_core.confidence import confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.kernels import Array32, from_rows, to_rows
@@ -128,19 +129,16 @@ def _final(
     if np.array_equal(modes[0], problem.prior.start):
         poses[0] = problem.T_camera_object  # kept as it came, without the rounding of float32
     hessian = run.hessian(modes[0])
+    unknown = ambiguities(
+        centred, masses, hessian, lambda T: run.evidence(to_rows(T)), model, problem.config.selection
+    )
     estimate = Estimate(
         T_camera_object=poses[0],
         confidence=belief,
         covariance=covariance(hessian, poses[0][:3, :3], model.radius, model.centre),
         hypotheses=_hypotheses(poses, masses),
-        ambiguities=ambiguities(
-            centred,
-            masses,
-            hessian,
-            lambda T: run.evidence(to_rows(T)),
-            model,
-            problem.config.selection,
-        ),
+        ambiguities=unknown,
+        certificates=certified(converged, bool(unknown), run.checks(modes[0])),
         seconds=time.perf_counter() - run.started,
         evaluations=run.evaluations,
         converged=converged,
