@@ -1,5 +1,11 @@
 /** Numbers as people read them. */
 
+/** What a snap is computed with: in a list of choices, and in a sentence. */
+export const METHODS = {
+  default: { choice: "Fast", name: "fast" },
+  paper: { choice: "Paper’s filter (5–10 s)", name: "paper’s filter" },
+};
+
 /** "1 scene", "3 scenes". */
 export function count(number, noun) {
   return `${number.toLocaleString("en")} ${noun}${number === 1 ? "" : "s"}`;

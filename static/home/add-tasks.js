@@ -2,7 +2,7 @@
 
 import { get, getAll, post } from "../api.js";
 import { byId, element, picture, setText } from "../dom.js";
-import { count } from "../format.js";
+import { count, METHODS } from "../format.js";
 import { messageArea } from "../message.js";
 
 /** `onAdded(number)` is called after tasks were made. */
@@ -14,6 +14,7 @@ export function setUpAddTasks(onAdded) {
   const message = messageArea(byId("add-message"));
   let objects = [];
 
+  byId("add-method").append(...Object.entries(METHODS).map(([method, { choice }]) => new Option(choice, method)));
   datasetSelect.addEventListener("change", () => guarded(() => showDataset()));
   sceneSelect.addEventListener("change", () => guarded(showScene));
   list.addEventListener("change", showChoice);
@@ -67,10 +68,10 @@ export function setUpAddTasks(onAdded) {
 
   async function addTasks() {
     byId("add-start").disabled = true;
-    const scene = { scene_id: numberOrText(sceneSelect.value) };
+    const common = { scene_id: numberOrText(sceneSelect.value), method: byId("add-method").value };
     const ids = chosenIds();
     try {
-      for (const id of ids) await post("/api/tasks", { ...scene, object_id: id });
+      for (const id of ids) await post("/api/tasks", { ...common, object_id: id });
     } catch (error) {
       await showScene(); // Shows which of them were made before the failure.
       throw error;

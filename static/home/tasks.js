@@ -2,7 +2,7 @@
 
 import { get, getAll } from "../api.js";
 import { byId, element, icon, picture, setText } from "../dom.js";
-import { count, taskName } from "../format.js";
+import { count, METHODS, taskName } from "../format.js";
 
 const PAGE = 48;
 const STATES = { open: "Open", in_progress: "In progress", submitted: "Submitted", skipped: "Skipped" };
@@ -110,11 +110,16 @@ function taskCard(task, me) {
       "span",
       { className: "card-text" },
       element("span", { className: "card-name" }, taskName(task)),
-      element("span", { className: "card-scene" }, task.scene.label),
+      element("span", { className: "card-scene" }, sceneText(task)),
       element("span", { className: "card-state" }, icon(task.state), stateSentence(task, me)),
     ),
   );
   return card;
+}
+
+/** "scene 3", "scene 3 · paper’s filter". */
+function sceneText({ scene, method }) {
+  return method === "default" ? scene.label : `${scene.label} · ${METHODS[method].name}`;
 }
 
 /** Who submitted the task, each name leading to the replay: one's own, or everybody's for a reviewer. */

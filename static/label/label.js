@@ -22,6 +22,7 @@ import { setUpHelp } from "./help.js";
 import { imagePart } from "./image.js";
 import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { machinePart } from "./machine.js";
+import { methodPart } from "./method.js";
 import { goToNext } from "./next.js";
 import { numbersPart } from "./numbers.js";
 import { drawPanel, possible } from "./panel.js";
@@ -72,6 +73,7 @@ const PARTS = [
   guidePart(page),
   imagePart(page),
   machinePart(page),
+  methodPart(page),
   numbersPart(page),
   placePart(page),
   threePointsPart(page),
@@ -237,7 +239,8 @@ async function perform(name) {
 async function requestSnap() {
   const before = registration.snap;
   snapRequest = post(path("snaps"), {});
-  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null } });
+  const { method } = registration;
+  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method } });
   try {
     await snapRequest;
   } catch (error) {

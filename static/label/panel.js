@@ -2,11 +2,10 @@
 
 import { byId, icon, setText } from "../dom.js";
 import { hintFor } from "./hint.js";
-import { isSnapping, waitingText } from "./waiting.js";
+import { isSnapping, snappingText, waitingText } from "./waiting.js";
 
 const SNAP_STATUS = {
   queued: "Waiting for a worker…",
-  running: "Snapping…",
   cancelled: "Snap cancelled. The pose is as you left it.",
   failed: "The snap failed.",
 };
@@ -82,14 +81,19 @@ function drawSnap(registration) {
   setText(byId("snap-status"), snapStatus(registration));
 }
 
-function snapStatus({ state, snap, offer, confidence }) {
-  if (!snap || state !== "open") return "";
+function snapStatus({ state, snap, offer, confidence, method, methods }) {
+  if (state !== "open") return "";
+  const isChosen = method === "paper" && methods.length > 1 && (!snap || (snap.state === "done" && snap.method !== method));
+  if (isChosen && !offer) return "Snap is by the paper’s filter now: 5 to 10 s.";
+  if (!snap) return "";
   if (snap.state !== "done") {
-    return waitingText(snap) ?? (snap.asked_by === "machine" ? UNASKED : SNAP_STATUS)[snap.state];
+    if (snap.asked_by === "machine") return waitingText(snap) ?? UNASKED[snap.state];
+    return waitingText(snap) ?? (snap.state === "running" ? snappingText(snap) : SNAP_STATUS[snap.state]);
   }
   if (offer?.quiet) return "";
   if (offer) return "You moved the object meanwhile: the result is offered.";
-  return confidence === null ? "" : `Snapped, confidence ${confidence.toFixed(2)}.`;
+  const how = snap.method === "paper" ? "Snapped by the paper’s filter" : "Snapped";
+  return confidence === null ? "" : `${how}, confidence ${confidence.toFixed(2)}.`;
 }
 
 function drawOffer({ offer, state }) {

@@ -5,7 +5,7 @@ import { byId, setText } from "../dom.js";
 
 const PATIENCE_MS = 2000;
 const ASK_AGAIN_MS = 1000;
-const LONG_SECONDS = 10;
+const LONG_SECONDS = { default: 10, paper: 60 };
 const NO_WORKER = "No worker is there; Snap works again when one is up. You can go on by hand.";
 const SLOW = "The worker takes long. You can go on by hand, or cancel.";
 
@@ -20,29 +20,35 @@ export function waitingText({ id }) {
   return id !== null && id === told.id ? told.text : null;
 }
 
+/** What there is to say of a snap that a worker is at. */
+export function snappingText({ method }) {
+  return method === "paper" ? "The paper’s filter runs…" : "Snapping…";
+}
+
 /** A part of the labelling page. */
 export function waitingPart() {
   let followed = null;
   let timer = null;
 
   function draw(registration) {
-    const id = isSnapping(registration) ? registration.snap.id : null;
+    const snap = isSnapping(registration) ? registration.snap : null;
+    const id = snap?.id ?? null;
     if (id === followed) return;
     followed = id;
     tell(null, "", "");
     clearTimeout(timer);
-    if (id !== null) timer = setTimeout(ask, PATIENCE_MS, id);
+    if (id !== null) timer = setTimeout(ask, PATIENCE_MS, id, snap.method);
   }
 
-  async function ask(id) {
+  async function ask(id, method) {
     // Where the server does not answer, the page has said so: what follows here would only repeat it.
     const snap = await get(`/api/snaps/${id}`).catch(() => null);
     if (id !== followed) return;
     if (snap?.standing) {
-      tell(id, textFor(snap), `${Math.round(snap.standing.seconds)} s`);
+      tell(id, textFor({ ...snap, method }), `${Math.round(snap.standing.seconds)} s`);
       setText(byId("snap-status"), told.text);
     }
-    timer = setTimeout(ask, ASK_AGAIN_MS, id);
+    timer = setTimeout(ask, ASK_AGAIN_MS, id, method);
   }
 
   return { draw };
@@ -54,8 +60,8 @@ function tell(id, text, seconds) {
   setText(byId("snap-seconds"), seconds);
 }
 
-function textFor({ state, standing: { workers, ahead, seconds } }) {
-  if (state === "running") return seconds < LONG_SECONDS ? "Snapping…" : SLOW;
+function textFor({ state, method, standing: { workers, ahead, seconds } }) {
+  if (state === "running") return seconds < LONG_SECONDS[method] ? snappingText({ method }) : SLOW;
   if (workers === 0) return NO_WORKER;
   return `All workers are busy; ${ahead === 0 ? "yours is next" : `${ahead} before you`}.`;
 }

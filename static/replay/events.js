@@ -1,6 +1,7 @@
 /** The list of events, and going from one to the next. */
 
 import { byId, element, icon } from "../dom.js";
+import { METHODS } from "../format.js";
 import { clockText } from "./clock.js";
 
 const WORDS = {
@@ -64,10 +65,11 @@ function row(event, choose) {
   return element("li", {}, button);
 }
 
-/** "Drag · tx, rz · 1.2 s", "Snap applied · 0.97 · 0.1 s". */
-function sentence({ kind, start, end, dof, technique, confidence }) {
+/** "Drag · tx, rz · 1.2 s", "Snap applied · fast · 0.97 · 0.1 s". */
+function sentence({ kind, start, end, dof, technique, method, confidence }) {
   const parts = [WORDS[kind] ?? kind.replaceAll("_", " ")];
   if (technique) parts.push(technique);
+  if (method) parts.push(METHODS[method].name);
   if (kind === "drag" && dof) parts.push(dof.join(", "));
   if (confidence !== null) parts.push(confidence.toFixed(2));
   if (end - start >= 0.05) parts.push(`${(end - start).toFixed(1)} s`);
