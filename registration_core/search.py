@@ -86,8 +86,12 @@ class Search:
             poses[kept], self.surface, self.observation.grid, model.radius, points, stage.iterations, tukey
         )
         self.evaluations += len(poses) * stage.iterations
+        return ranked(poses, self.refined_weight(poses, stage), len(poses))
+
+    def refined_weight(self, poses: Array32, stage: StageConfig) -> Array32:
+        """Agreement (N,) of polished poses (N, 3, 4), as a stage has it."""
         ring = self.surface.ring.shape[2]
-        return ranked(poses, self._agreement(poses, stage.points, ring, stage.epsilon, 1.0, True), len(poses))
+        return self._agreement(poses, stage.points, ring, stage.epsilon, 1.0, True)
 
     def polished(self, poses: Array32, iterations: int, tukey: tuple[float, float]) -> Array32:
         """Poses (N, 3, 4) after steps with all surface points; see `polish`."""

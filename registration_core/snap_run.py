@@ -6,6 +6,7 @@ every other view sees the same poses from where its camera stands. What the view
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
 from registration_core.problem import Problem
 from registration_core.search import Search
-from registration_core.selection import Judgement, match_shares
+from registration_core.selection import Judgement
 
 Array = NDArray[np.float64]
 
@@ -29,10 +30,6 @@ NEAR_ITERATIONS = 14
 
 JOINT_ITERATIONS, JOINT_TUKEY = 10, (0.015, 0.004)
 """Steps of the joint polish of a mode that one view has found, and widths of its robust kernel, metres."""
-JOINT_NICHE = (0.003, 0.05)
-"""Modes closer than this are one, metres and radians."""
-JOINT_MODES = 32
-"""Modes of one round that are judged by all views."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +51,12 @@ class Sighting:
     def systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
         """`Search.systems` of poses (N, 3, 4) in the first camera, in its axes."""
         hessians, sides, weights = self.search.systems(self.seen(poses), tukey)
-        to_first = np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
-        return to_first @ hessians @ to_first.T, sides @ to_first.T, weights
+        return self._to_first @ hessians @ self._to_first.T, sides @ self._to_first.T, weights
+
+    @cached_property
+    def _to_first(self) -> Array:
+        """(6, 6), turns twists of this camera into those of the first one."""
+        return np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ class SnapRun:
         for stage, parts in enumerate(zip(*rounds, strict=True)):
             views = zip(self.sightings, parts, strict=True)
             poses = np.concatenate([sighting.found(part) for sighting, part in views])
-            yield self._joined(poses) if stage == len(self.problem.config.stages) else poses
+            yield self._joined(poses, share) if stage == len(self.problem.config.stages) else poses
 
     def judge(self, candidates: Array32, counts: Array) -> Judgement:
         """Choose among poses (N, 3, 4), of evidence (N, COUNT): the start, its polishes, and other modes."""
@@ -118,12 +119,18 @@ class SnapRun:
         hessians, sides, weights = (np.sum(part, axis=0) for part in zip(*parts, strict=True))
         return hessians, sides, weights
 
-    def _joined(self, poses: Array32) -> Array32:
-        """The distinct modes among poses (N, 3, 4) that single views have found, polished by all of them."""
+    def _joined(self, poses: Array32, share: float) -> Array32:
+        """The distinct modes among poses (N, 3, 4) that single views have found, polished by all of them: as
+        many as a round of this share leaves in one view, best first.
+        """
         move_to_nearest_twin(poses, self.problem.model.symmetries, self.problem.prior.start)
         poses = self._polished(poses, JOINT_ITERATIONS, JOINT_TUKEY)
-        agreement = match_shares(self.evidence(poses) / len(self.sightings)).astype(np.float32)
-        return poses[distinct(poses, agreement, JOINT_MODES, *JOINT_NICHE)]
+        last = self.problem.config.stages[-1]
+        agreement = np.sum(
+            [one.search.refined_weight(one.seen(poses), last) for one in self.sightings], axis=0
+        )
+        most = max(1, int(share * last.modes))
+        return poses[distinct(poses, agreement, most, last.niche_translation, last.niche_rotation)]
 
     def _polished(self, poses: Array32, iterations: int, tukey: tuple[float, float]) -> Array32:
         """Poses (N, 3, 4) after Gauss-Newton steps on the normal equations of all views together; Tukey's
