@@ -56,7 +56,8 @@ class Sighting:
     @cached_property
     def _to_first(self) -> Array:
         """(6, 6), turns twists of this camera into those of the first one."""
-        return np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
+        turned: Array = np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
+        return turned
 
 
 @dataclass(frozen=True, eq=False)
