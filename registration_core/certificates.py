@@ -79,8 +79,13 @@ class Certificates:
     """No other pose explains the depth as well, symmetric twins aside."""
     check: Check
     """The one that decided: of a view that disagrees, else of one that agrees, else of the first."""
-    views: int
-    """Unused views that show enough of the object to tell."""
+    unused: tuple[Check, ...]
+    """What each view says that was not used, in their order."""
+
+    @property
+    def views(self) -> int:
+        """Unused views that show enough of the object to tell."""
+        return sum(check.is_enough for check in self.unused)
 
 
 def certified(
@@ -100,7 +105,7 @@ def certified(
         observably_correct=converged and decisive.agrees,
         non_degenerate=converged and not is_ambiguous,
         check=decisive,
-        views=sum(check.is_enough for check in unused),
+        unused=tuple(unused),
     )
 
 

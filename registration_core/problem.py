@@ -88,7 +88,7 @@ def checked_problem(
     start = centred(T, viewpoints.centre)
     check_in_view(viewpoints, camera, start)
     prior, search = _priors(start, config.spread, start_spread)
-    mask = None if explained is None else _checked_mask(explained, camera)
+    mask = None if explained is None else checked_mask(explained, camera)
     return Problem(viewpoints, image, camera, T, start, prior, search, config, mask)
 
 
@@ -139,7 +139,8 @@ def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
     return image
 
 
-def _checked_mask(explained: ArrayLike, camera: Intrinsics) -> NDArray[np.bool_]:
+def checked_mask(explained: ArrayLike, camera: Intrinsics) -> NDArray[np.bool_]:
+    """The pixels (H, W) of known objects; raises a ValueError where they are no booleans of that shape."""
     mask = np.asarray(explained)
     if mask.dtype != np.bool_ or mask.shape != (camera.height, camera.width):
         raise ValueError(

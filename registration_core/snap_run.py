@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from registration_core import pose, selection
-from registration_core.certificates import Check
+from registration_core.camera import Intrinsics
+from registration_core.certificates import Check, checked_by
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
@@ -56,8 +57,22 @@ class Sighting:
     @cached_property
     def _to_first(self) -> Array:
         """(6, 6), turns twists of this camera into those of the first one."""
-        turned: Array = np.kron(np.eye(2), self.T_camera_first[:3, :3].T)
+        turned = np.zeros((6, 6))
+        turned[:3, :3] = turned[3:, 3:] = self.T_camera_first[:3, :3].T
         return turned
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """A view that is not used: it is asked at the end whether it agrees."""
+
+    depth: NDArray[np.float32]
+    """(H, W), metres."""
+    camera: Intrinsics
+    T_camera_first: Array
+    """(4, 4), from the axes of the first view's camera."""
+    explained: NDArray[np.bool_] | None
+    """(H, W), the pixels of known objects; None where there are none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +84,7 @@ class SnapRun:
     seed: int
     started: float
     """`time.perf_counter()` at the start."""
+    witnesses: tuple[Witness, ...] = ()
 
     @property
     def problem(self) -> Problem:
@@ -110,6 +126,16 @@ class SnapRun:
     def checks(self, T: Array32) -> list[Check]:
         """What the pixels that each view's search left unread say of a pose (3, 4)."""
         return [one.search.check(from_rows(one.seen(T[None]))[0]) for one in self.sightings]
+
+    def unused_checks(self, T: Array32) -> list[Check]:
+        """What each view that was not used says of a pose (3, 4)."""
+        centre = from_rows(T[None])[0]
+        return [
+            checked_by(
+                one.depth, one.camera, self.problem.model, one.T_camera_first @ centre, False, one.explained
+            )
+            for one in self.witnesses
+        ]
 
     def hessian(self, T: Array32) -> Array:
         """How firmly the depth of all views holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""

@@ -138,7 +138,7 @@ def _final(
         covariance=covariance(hessian, poses[0][:3, :3], model.radius, model.centre),
         hypotheses=_hypotheses(poses, masses),
         ambiguities=unknown,
-        certificates=certified(converged, bool(unknown), run.checks(modes[0])),
+        certificates=certified(converged, bool(unknown), run.checks(modes[0]), run.unused_checks(modes[0])),
         seconds=time.perf_counter() - run.started,
         evaluations=run.evaluations,
         converged=converged,

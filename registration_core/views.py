@@ -2,7 +2,9 @@
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import fields, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,12 +13,12 @@ from registration_core import pose
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
 from registration_core.object_model import ObjectModel
-from registration_core.problem import OutOfViewError, Problem, checked_problem
+from registration_core.problem import OutOfViewError, Problem, checked_depth, checked_mask, checked_problem
 from registration_core.search import search_of
 from registration_core.seeding import seed_of
 from registration_core.snap import steps_of
 from registration_core.snap_config import SnapConfig
-from registration_core.snap_run import Sighting, SnapRun
+from registration_core.snap_run import Sighting, SnapRun, Witness
 
 Array = NDArray[np.float64]
 View = tuple[ArrayLike, Intrinsics, ArrayLike]
@@ -31,6 +33,7 @@ def snap_views(
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
     explained: Sequence[ArrayLike | None] | None = None,
+    used: int | None = None,
 ) -> WorldEstimate:
     """Refine the operator's pose of an object against several depth images of a scene that stands still.
 
@@ -45,11 +48,13 @@ def snap_views(
         rng: as for `snap`.
         start_spread: as for `snap`.
         explained: as for `snap`, one for each view, None for a view without.
+        used: so many of the views, the first ones, are used; the others are only asked at the end whether
+            they agree: `Certificates.unused`. All are used where it is None.
 
     Raises:
         ValueError: naming the argument that is wrong, and how.
     """
-    for step in snap_views_steps(model, views, T_world_object, config, rng, start_spread, explained):
+    for step in snap_views_steps(model, views, T_world_object, config, rng, start_spread, explained, used):
         if isinstance(step.estimate, WorldEstimate):
             return step.estimate
     raise AssertionError("the last step carries the estimate")
@@ -63,6 +68,7 @@ def snap_views_steps(
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
     explained: Sequence[ArrayLike | None] | None = None,
+    used: int | None = None,
 ) -> Iterator[SnapStep]:
     """`snap_views` step by step, as `snap_steps`; the world takes the place of the camera in every step.
 
@@ -72,45 +78,66 @@ def snap_views_steps(
     config = SnapConfig() if config is None else config
     if len(views) == 0:
         raise ValueError("views must hold at least one view; there is none")
-    if config.method != "viewpoint":
-        raise ValueError("config.method must be 'viewpoint': the particle filter knows one view only")
+    used = len(views) if used is None else used
+    if not 1 <= used <= len(views):
+        raise ValueError(f"used must be from 1 to the number of views, {len(views)}; it is {used!r}")
+    if config.method != "viewpoint" and used > 1:
+        raise ValueError("config.method must be 'viewpoint': the particle filter uses one view only")
     masks = [None] * len(views) if explained is None else explained
     if len(masks) != len(views):
         raise ValueError(
-            f"explained must hold a mask or None for each of {len(views)} views; it has {len(masks)}"
+            f"explained must hold a mask or None for each of the views, {len(views)}; it has {len(masks)}"
         )
     T_start = pose.checked(T_world_object, "T_world_object")
-    problems = _problems(model, views, masks, T_start, config, start_spread)
+    checked = [
+        _checked(number, view, mask) for number, (view, mask) in enumerate(zip(views, masks, strict=True))
+    ]
+    problems = _problems(model, checked[:used], T_start, config, start_spread)
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
     searches = [(search_of(problem, rng), T_world_camera) for problem, T_world_camera in problems]
     searches = [one for one in searches if one[0].sees_enough] or searches[:1]
     T_world_first = searches[0][1]
     sightings = [Sighting(search, pose.inverse(T) @ T_world_first) for search, T in searches]
-    run = SnapRun(tuple(sightings), seed, started)
+    witnesses = [
+        Witness(depth, camera, pose.inverse(T) @ T_world_first, mask)
+        for depth, camera, T, mask in checked[used:]
+    ]
+    run = SnapRun(tuple(sightings), seed, started, tuple(witnesses))
     return (_in_world(step, T_world_first, T_start, run.problem.T_camera_object) for step in steps_of(run))
+
+
+class _CheckedView(NamedTuple):
+    depth: NDArray[np.float32]
+    camera: Intrinsics
+    T_world_camera: Array
+    explained: NDArray[np.bool_] | None
+
+
+def _checked(number: int, view: View, explained: ArrayLike | None) -> _CheckedView:
+    depth, camera, T_world_camera = view
+    try:
+        image = checked_depth(depth, camera)
+        mask = None if explained is None else checked_mask(explained, camera)
+        return _CheckedView(image, camera, pose.checked(T_world_camera, "T_world_camera"), mask)
+    except ValueError as error:
+        raise ValueError(f"views[{number}]: {error}") from error
 
 
 def _problems(
     model: ObjectModel,
-    views: Sequence[View],
-    masks: Sequence[ArrayLike | None],
+    views: Sequence[_CheckedView],
     T_world_object: Array,
     config: SnapConfig,
     start_spread: tuple[float, float] | None,
 ) -> list[tuple[Problem, Array]]:
     """What is to be done in each view that may show the object, and its `T_world_camera` (4, 4)."""
     found = []
-    for number, ((depth, camera, T_given), mask) in enumerate(zip(views, masks, strict=True)):
-        T_world_camera = pose.checked(T_given, f"views[{number}]: T_world_camera")
-        T_camera_object = pose.inverse(T_world_camera) @ T_world_object
-        try:
-            problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread, mask)
-        except OutOfViewError:
-            continue
-        except ValueError as error:
-            raise ValueError(f"views[{number}]: {error}") from error
-        found.append((problem, T_world_camera))
+    for depth, camera, T_world_camera, mask in views:
+        T = pose.inverse(T_world_camera) @ T_world_object
+        with suppress(OutOfViewError):
+            problem = checked_problem(model, depth, camera, T, config, start_spread, mask)
+            found.append((problem, T_world_camera))
     if not found:
         raise ValueError("T_world_object puts the object wholly outside the image of every view")
     return found

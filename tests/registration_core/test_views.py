@@ -105,6 +105,24 @@ def test_known_objects_are_left_out_of_the_view_that_shows_them(views) -> None:
     np.testing.assert_array_equal(with_it.T_world_object, run(views[:1], start).T_world_object)
 
 
+def test_views_that_are_not_used_say_whether_they_agree(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.02, 0.2, np.random.default_rng(2))
+    depth, camera, T = views[2]
+    without_it = (np.where(depth > 0, np.float32(2.0), 0.0), camera, T)
+    away = (depth, camera, T @ pose.exp([0.0, 0.0, 0.0, 0.0, np.pi, 0.0]))
+    estimate = run([*views[:2], views[2], without_it, away], start, used=2)
+    np.testing.assert_array_equal(estimate.T_world_object, run(views[:2], start).T_world_object)
+    agreeing, seen_through, blind = estimate.certificates.unused
+    assert agreeing.agrees
+    assert agreeing.match > 0.95
+    assert not seen_through.agrees
+    assert seen_through.behind == 1.0
+    assert not blind.is_enough
+    assert estimate.certificates.views == 2
+    assert not estimate.certificates.observably_correct
+    assert run(views, start, used=2).certificates.observably_correct
+
+
 def test_far_from_the_origin_of_the_world_is_as_exact(views) -> None:
     start = pose.perturbed(T_WORLD_OBJECT, 0.03, 0.3, np.random.default_rng(1))
     away = pose.exp([4e5, -5e6, 300.0, 0.0, 0.0, 1.0])
@@ -138,7 +156,10 @@ def test_bad_input_is_named(views) -> None:
         (T_WORLD_OBJECT, [(depth[:5], camera, T)], {}, r"views\[0\]: depth must have the shape"),
         (T_WORLD_OBJECT, [(depth, camera, 2.0 * T)], {}, r"views\[0\]: T_world_camera must"),
         (outside, [(depth, camera, T)], {}, "T_world_object puts the object wholly outside"),
-        (T_WORLD_OBJECT, [(depth, camera, T)], {"config": SnapConfig.paper()}, "config.method must"),
+        (T_WORLD_OBJECT, views, {"config": SnapConfig.paper()}, "config.method must"),
+        (T_WORLD_OBJECT, views, {"used": 0}, "used must be from 1"),
+        (T_WORLD_OBJECT, views, {"used": 4}, "used must be from 1"),
+        (T_WORLD_OBJECT, [views[0], (depth[:5], camera, T)], {"used": 1}, r"views\[1\]: depth must have"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": []}, "explained must hold"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth > 0.5, None]}, "explained must hold"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth]}, r"views\[0\]: explained must be"),

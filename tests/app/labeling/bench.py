@@ -106,7 +106,7 @@ class Searchers:
 
 
 CHECK = Check(pixels=400, seen=0.9, match=0.96, behind=0.01, behind_by=0.014, before=0.0, before_by=0.0)
-SURE = Certificates(observably_correct=True, non_degenerate=True, check=CHECK, views=0)
+SURE = Certificates(observably_correct=True, non_degenerate=True, check=CHECK, unused=())
 
 
 def result(T: np.ndarray, confidence: float = 0.9, certificates: Certificates = SURE) -> SnapResult:
