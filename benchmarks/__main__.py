@@ -29,6 +29,7 @@ from benchmarks import (
     techniques,
 )
 from benchmarks.figures import Figure, table
+from benchmarks.registration import sensors
 
 BENCHMARKS = {
     "startup": startup,
@@ -41,6 +42,7 @@ BENCHMARKS = {
     "load": load,
     "techniques": techniques,
     "registration": registration,
+    "sensors": sensors,
     "ablation": ablation,
     "known": known,
     "study": study,

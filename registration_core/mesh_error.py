@@ -18,9 +18,10 @@ def imprecise(
     """The model with its size off by up to `scale` along each axis of its frame, and warped smoothly by up to
     `warp` of its diameter.
 
-    Both leave the centre about where it is. The symmetries stay those of the true object.
+    Some meshes are better than others: how much either may be is drawn first. Both leave the centre about
+    where it is. The symmetries stay those of the true object.
     """
-    factors = 1.0 + rng.uniform(-scale, scale, 3)
+    factors = 1.0 + scale * rng.random() * rng.uniform(-1.0, 1.0, 3)
     away = model.vertices - model.centre
     moved = np.zeros_like(away)
     for _ in range(WAVES):

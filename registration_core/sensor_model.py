@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter, maximum_filter, minimum_filter
 
 from registration_core.camera import Intrinsics
 from registration_core.kernels import EXACT
@@ -23,6 +23,8 @@ CELLS_A_RADIUS = 3
 """A wide field is drawn on a grid with at least so many cells in its radius, and interpolated."""
 REACH = 2.0
 """Radii after which a blending kernel ends."""
+GROWTH_STEP = 0.015
+"""A smaller step than this lets no surface grow over another one, metres."""
 ROUNDING_GAP = 0.1
 """Light that comes by way of another surface does so from no farther than this, metres at 1 m."""
 ALMOST_THE_SAME = 0.7
@@ -44,6 +46,8 @@ class Sensor:
     """Standard deviation of a displacement of each pixel alone, pixels: frayed rims."""
 
     # Surfaces that run into each other.
+    growth: float = 0.0
+    """Radius of the window in which the nearest surface wins over others, pixels: it grows beyond its rim."""
     blend: float = 0.0
     """Radius of the window over which depth is averaged, pixels: fillets where things touch."""
     blend_gap: float = 0.02
@@ -69,12 +73,18 @@ class Sensor:
     """Error of the whole image that does not grow with distance, metres."""
     step: float = 0.0
     """Quantisation step at 1 m, metres: the disparity is what is rounded."""
+    unit: float = 0.0
+    """What depth is stored in whole multiples of, metres."""
 
     # Pixels without a measurement.
     edge: float = 0.03
     """Metres between neighbours that make an edge of depth."""
     edge_holes: float = 0.0
     """Share of the pixels at such edges that are lost."""
+    rim_holes: float = 0.0
+    """Pixels to each side of such edges that are lost, on average; wavy, so that none or more may be."""
+    rim_radius: float = 6.0
+    """How far along a rim as many are lost, pixels."""
     baseline: float = 0.0
     """How far to the right of the camera stands the projector or second camera, metres: what it does not see
     is lost."""
@@ -100,12 +110,12 @@ class Sensor:
 
 def measure(depth: DepthImage, camera: Intrinsics, rng: np.random.Generator, sensor: Sensor) -> DepthImage:
     """What the sensor measures of perfect depth (H, W) in metres, 0 = nothing; the result likewise."""
-    seen = displaced(depth, sensor, rng)
+    seen = grown(displaced(depth, sensor, rng), sensor.growth)
     measured = shaken(seen, sensor.jitter, rng)
     measured = blended(measured, sensor.blend, sensor.blend_gap)
     measured = rounded(measured, sensor)
     measured = with_flying_pixels(measured, sensor, rng)
-    measured = quantised(noisy(measured, sensor, rng), sensor.step)
+    measured = stored(quantised(noisy(measured, sensor, rng), sensor.step), sensor.unit)
     lost = holes(seen, camera, sensor, rng) | (measured > sensor.farthest)
     return np.where(lost, np.float32(0.0), measured)
 
@@ -161,6 +171,17 @@ def _interpolate(nodes, cell, out):
             upper = nodes[i, j] + u * (nodes[i, j + 1] - nodes[i, j])
             lower = nodes[i + 1, j] + u * (nodes[i + 1, j + 1] - nodes[i + 1, j])
             out[row, column] = upper + v * (lower - upper)
+
+
+def grown(depth: DepthImage, radius: float) -> DepthImage:
+    """Depth in which, up to `radius` pixels from a step, the nearest surface wins; 0 stays 0."""
+    if radius < 1.0:
+        return depth
+    reach = np.arange(-int(radius), int(radius) + 1)
+    disc = reach[:, None] ** 2 + reach**2 <= radius**2
+    nearest = minimum_filter(np.where(depth > 0.0, depth, np.float32(np.inf)), footprint=disc)
+    at_rims = maximum_filter(depth, footprint=disc) - nearest > GROWTH_STEP
+    return np.where(at_rims & (depth > 0.0), nearest, depth)
 
 
 def blended(depth: DepthImage, radius: float, gap: float) -> DepthImage:
@@ -242,11 +263,19 @@ def quantised(depth: DepthImage, step: float) -> DepthImage:
     return (1.0 / np.where(levels > 0.0, levels, np.inf)).astype(np.float32)
 
 
+def stored(depth: DepthImage, unit: float) -> DepthImage:
+    """Depth in whole multiples of `unit`, metres."""
+    return depth if unit == 0.0 else np.rint(depth / np.float32(unit)) * np.float32(unit)
+
+
 def holes(depth: DepthImage, camera: Intrinsics, sensor: Sensor, rng: np.random.Generator) -> Mask:
     """Pixels (H, W) of which nothing is measured, whatever their depth."""
     lost = np.zeros(depth.shape, dtype=bool)
     if sensor.edge_holes > 0.0:
         lost |= at_edges(depth, sensor.edge) & (rng.random(depth.shape) < sensor.edge_holes)
+    if sensor.rim_holes > 0.0:
+        width = sensor.rim_holes * (1.0 + field(depth.shape, sensor.rim_radius, rng))
+        lost |= distance_transform_edt(~at_edges(depth, sensor.edge)) + 0.5 < width
     if sensor.grazing > 0.0:
         lost |= rng.random(depth.shape) > facing(depth, camera) / sensor.grazing
     if sensor.speckle_holes > 0.0:

@@ -67,8 +67,8 @@ def test_nothing_stays_nothing(family: SensorFamily):
 
 @pytest.mark.parametrize("family", FULL, ids=list(FAMILIES))
 def test_errors_grow_with_distance_squared(family: SensorFamily):
-    """Those that vary over the image; all of them apart from coarse steps, which do the same."""
-    sensor = draw_sensor(family, np.random.default_rng(1))
+    """Those that vary over the image, before they are rounded to what is stored."""
+    sensor = dataclasses.replace(draw_sensor(family, np.random.default_rng(1)), unit=0.0, step=0.0)
     spread = []
     for z in (0.5, 1.0):
         depth = measure(wall(z), CAMERA, np.random.default_rng(2), sensor)

@@ -63,6 +63,14 @@ def test_holes_are_at_edges_only():
     assert not lost[:, 81:].any()
 
 
+def test_holes_along_rims_are_as_wide_as_wanted_and_wavy():
+    lost = measured(step(1.0, 1.2), rim_holes=4.0) == 0.0
+    assert lost.sum(axis=1).mean() == pytest.approx(2 * 4.0, abs=2.5)
+    assert lost.sum(axis=1).std() > 1.5
+    assert not lost[:, :55].any()
+    assert not lost[:, 105:].any()
+
+
 def test_a_small_step_is_no_edge():
     assert not at_edges(step(1.0, 1.02), 0.03).any()
 
@@ -129,6 +137,17 @@ def test_rims_are_wavy_or_frayed(errors, shares):
     assert least < np.corrcoef(rims[:-1], rims[1:])[0, 1] < most
 
 
+def test_the_near_surface_grows_over_the_far_one():
+    grown = measured(step(1.0, 1.2), growth=3.0)
+    assert (grown == np.float32(1.0)).sum(axis=1).tolist() == [83] * CAMERA.height
+    assert np.array_equal(measured(step(1.0, 1.01), growth=3.0), step(1.0, 1.01))
+
+
+def test_nothing_grows_over_what_is_not_measured():
+    depth = step(1.0, 0.0)
+    assert np.array_equal(measured(depth, growth=3.0), depth)
+
+
 def test_small_steps_are_blended_and_large_ones_are_not():
     melted = measured(step(1.0, 1.01), blend=3.0, blend_gap=0.02)
     assert np.all(np.diff(melted[60]) >= 0.0)
@@ -167,6 +186,12 @@ def test_a_bias_grows_with_distance_squared_and_an_offset_does_not():
         for name in ("bias", "offset")
     ]
     assert errors == [pytest.approx([0.001, 0.016], rel=1e-3), pytest.approx([0.004, 0.004], rel=1e-3)]
+
+
+def test_depth_is_stored_in_whole_units():
+    raw = measured(slanted(0.5), unit=0.001) / 0.001
+    assert raw == pytest.approx(np.rint(raw), abs=1e-3)
+    assert raw == pytest.approx(slanted(0.5) / 0.001, abs=0.5 + 1e-3)
 
 
 def test_shadows_lie_on_the_side_away_from_the_projector():
