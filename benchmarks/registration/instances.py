@@ -2,7 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from benchmarks.registration.objects import APC_BOX, DATA, known_objects, with_s
 from benchmarks.registration.starts import is_in_view
 from registration_core import Intrinsics, ObjectModel, pose
 from registration_core.bop import BopObject, read_dataset, read_depth
+from registration_core.mesh_error import imprecise
+from registration_core.sensor_families import DEMO, FAMILIES, draw_sensor, measure
 from registration_core.synthetic_scene import View, make_scene
 from registration_core.tabletop import Layout
 
@@ -19,7 +22,12 @@ Array = NDArray[np.float64]
 
 HALF, HIDDEN = "at least half visible", "30-50 % visible"
 YCB, BUNNY, MORO, APC, RBT = "ycbv/000001", "bunny", "moro", "apc", "rbt"
-SYNTHETIC, REAL = (HALF, HIDDEN), (YCB, BUNNY, MORO, APC, RBT)
+INEXACT = "meshes off by 1 %"
+SENSORS = tuple(f"sensor: {name}" for name in FAMILIES if name != DEMO.name)
+"""The scenes of HALF as other families of sensors measure them."""
+PLAIN = (HALF, HIDDEN)
+"""With the demo scenes' sensor and exact meshes."""
+SYNTHETIC, REAL = (*PLAIN, *SENSORS, INEXACT), (YCB, BUNNY, MORO, APC, RBT)
 SETS = SYNTHETIC + REAL
 
 
@@ -105,6 +113,31 @@ def synthetic_instances(set_name: str, an_object: int, most_scenes: int = MOST_S
                     )
                 )  # fmt: skip
     return instances
+
+
+def sensor_instances(set_name: str, an_object: int, most_scenes: int = MOST_SCENES) -> list[Instance]:
+    """The instances of HALF, each measured by a sensor that is drawn from the family of the set."""
+    family = FAMILIES[set_name.removeprefix("sensor: ")]
+    found = []
+    for number, one in enumerate(_half_visible(an_object, most_scenes)):
+        rng = np.random.default_rng([SENSORS.index(set_name), number])
+        depth = measure(one.perfect_depth, one.camera, rng, draw_sensor(family, rng))
+        found.append(replace(one, set_name=set_name, depth=depth))
+    return found
+
+
+def inexact_instances(an_object: int, most_scenes: int = MOST_SCENES) -> list[Instance]:
+    """The instances of HALF, each with a mesh that is a little wrong."""
+    return [
+        replace(one, set_name=INEXACT, model=imprecise(one.model, np.random.default_rng(number)))
+        for number, one in enumerate(_half_visible(an_object, most_scenes))
+    ]
+
+
+@cache
+def _half_visible(an_object: int, most_scenes: int) -> tuple[Instance, ...]:
+    """The instances of HALF, made once for all sets that change something about them."""
+    return tuple(synthetic_instances(HALF, an_object, most_scenes))
 
 
 def _shows(view: View, index: int, model: ObjectModel, recipe: Recipe) -> bool:

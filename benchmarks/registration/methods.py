@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 from benchmarks.registration import peers, prototype
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
-from registration_core import SnapConfig, snap, warm_up
-from registration_core.kernels import from_rows
+from registration_core import SnapConfig, pose, snap, warm_up
+from registration_core.kernels import from_rows, to_rows
 from registration_core.problem import checked_problem
 from registration_core.search import search_of
+from registration_core.selection import match_shares, shown_shares
 from registration_core.snap_config import ParticleFilterConfig
 from registration_core.snap_run import Sighting, SnapRun
+from registration_core.verdict import judged
 
 Array = NDArray[np.float64]
 
@@ -78,13 +80,34 @@ def _snapped(
     return Outcome(estimate.T_camera_object, time.perf_counter() - began, estimate.confidence)
 
 
+@dataclass(frozen=True)
+class Opinion:
+    """What the judgement of a snap says of one pose."""
+
+    score: float
+    """Log-odds, up to a constant."""
+    match: float
+    """Share of the claimed surface, as far as it is not hidden, that was measured where it is claimed."""
+    shown: float
+    """Share of the outline's pixels that nothing hides."""
+
+
+def opinion(instance: Instance, T_start: Array, T: Array) -> Opinion:
+    """What a snap from one pose (4, 4) would say of another."""
+    centred = T @ pose.from_rotation_translation(np.eye(3), instance.model.centre)
+    score, counts = judged(_run(instance, T_start), to_rows(centred[None])[0])
+    return Opinion(score, float(match_shares(counts[None])[0]), float(shown_shares(counts[None])[0]))
+
+
 def polished_truth(instance: Instance) -> Array:
     """Where the finest polish of a snap ends when it starts at the truth: what the noise allows."""
-    problem = checked_problem(
-        instance.model, instance.depth, instance.camera, instance.truth, SnapConfig(), None
-    )
-    run = SnapRun((Sighting(search_of(problem, np.random.default_rng(0)), np.eye(4)),), 0, 0.0)
-    return problem.uncentred(from_rows(run.polished_start()[-1:])[0])
+    run = _run(instance, instance.truth)
+    return run.problem.uncentred(from_rows(run.polished_start()[-1:])[0])
+
+
+def _run(instance: Instance, T_start: Array) -> SnapRun:
+    problem = checked_problem(instance.model, instance.depth, instance.camera, T_start, SnapConfig(), None)
+    return SnapRun((Sighting(search_of(problem, np.random.default_rng(0)), np.eye(4)),), 0, 0.0)
 
 
 @cache

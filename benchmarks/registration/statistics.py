@@ -1,14 +1,17 @@
 """What success and confidence are worth: intervals over scenes, ranking, calibration."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
 
-RESAMPLES = 2000
+RESAMPLES, FEWER_RESAMPLES = 2000, 400
+"""Of scenes; fewer for what is slow to compute."""
 LEVEL = 0.95
+ACCEPTED_GOOD = 0.9
+"""Share of the right results that a threshold has to accept."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,30 @@ def share_over_scenes(values: ArrayLike, scenes: Sequence[object], seed: int = 0
     means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
     low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Share(float(numbers.mean()), float(low), float(high))
+
+
+def measure_over_scenes(
+    measure: Callable[[NDArray[np.float64], NDArray[np.bool_]], float],
+    confidence: ArrayLike,
+    correct: ArrayLike,
+    scenes: Sequence[object],
+    seed: int = 0,
+) -> Share:
+    """A measure of confidences (N,) and what was right (N,), with its interval as for `share_over_scenes`.
+
+    Draws of scenes without right or without wrong results, for which some measures are NaN, do not count.
+    """
+    claims, right = np.asarray(confidence, dtype=np.float64), np.asarray(correct, dtype=bool)
+    assert len(claims) == len(right) == len(scenes) > 0
+    _, cluster = np.unique([str(scene) for scene in scenes], return_inverse=True)
+    members = [np.flatnonzero(cluster == k) for k in range(cluster.max() + 1)]
+    rng, found = np.random.default_rng(seed), []
+    for _ in range(FEWER_RESAMPLES):
+        drawn = np.concatenate([members[k] for k in rng.integers(len(members), size=len(members))])
+        found.append(measure(claims[drawn], right[drawn]))
+    known = [value for value in found if not np.isnan(value)]
+    low, high = np.quantile(known, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]) if known else (np.nan, np.nan)
+    return Share(float(measure(claims, right)), float(low), float(high))
 
 
 def auroc(confidence: ArrayLike, correct: ArrayLike) -> float:
@@ -86,7 +113,7 @@ def calibration_error(confidence: ArrayLike, correct: ArrayLike, bins: int = 10)
     return sum(part.count * abs(part.confidence - part.correct) for part in parts) / total
 
 
-def false_accepts(confidence: ArrayLike, correct: ArrayLike, accepted_good: float = 0.9) -> float:
+def false_accepts(confidence: ArrayLike, correct: ArrayLike, accepted_good: float = ACCEPTED_GOOD) -> float:
     """Share of the wrong results that are accepted with the highest threshold that accepts enough good ones.
 
     NaN where there are no right ones or no wrong ones.

@@ -15,16 +15,20 @@ from benchmarks.registration.instances import (
     APC,
     BUNNY,
     HALF,
-    HIDDEN,
+    INEXACT,
     MORO,
     MOST_SCENES,
+    PLAIN,
     RBT,
     REAL,
+    SENSORS,
     SETS,
     SYNTHETIC,
     YCB,
     Instance,
+    inexact_instances,
     real_instances,
+    sensor_instances,
     synthetic_instances,
 )
 from benchmarks.registration.methods import (
@@ -42,7 +46,12 @@ from benchmarks.registration.objects import DATA
 from benchmarks.registration.overlays import write_overlays
 from benchmarks.registration.several_views import view_figures
 from benchmarks.registration.starts import GOOD, MIDDLE, NEAR, SHELLS, Shell
-from benchmarks.registration.tables import print_reliability, print_tables
+from benchmarks.registration.tables import (
+    print_confidences,
+    print_made_worse,
+    print_reliability,
+    print_tables,
+)
 from benchmarks.registration.targets import figures
 from benchmarks.registration.timing import timings
 from benchmarks.registration.trials import run_trials
@@ -51,21 +60,21 @@ OVERLAYS_VARIABLE = "BENCHMARK_OVERLAYS"
 TABLE_WIDTH = 120
 """Columns, also where the output is no terminal."""
 
-AN_OBJECT = 8
-"""Synthetic instances of each object in each set."""
+AN_OBJECT, OF_A_SENSOR = 8, 3
+"""Instances of each object in each plain synthetic set, and with each sensor and the wrong meshes."""
+QUICK_SETS = (HALF, SENSORS[0], YCB)
+"""One instance of each makes a quick run."""
 QUICK_SCENES = 3
-"""Of each synthetic set, in a quick run; they hold at least one instance."""
-STARTS = {HALF: 5, HIDDEN: 5, YCB: 20, BUNNY: 20, MORO: 6, APC: 20, RBT: 8}
+"""Of each synthetic set then; they hold at least one instance."""
+STARTS = dict.fromkeys(SYNTHETIC, 5) | {YCB: 20, BUNNY: 20, MORO: 6, APC: 20, RBT: 8}
 """From each shell about each instance: fewer where there are many instances."""
-WIDELY_STARTED = (*SYNTHETIC, YCB, BUNNY)
+WIDELY_STARTED = (*PLAIN, YCB, BUNNY)
 """Sets that are started from the farthest shell, too."""
-VIEW_STARTS = 20
-"""Of each group of views."""
-SEEDS = 10
-"""Of proposals for each instance."""
+SEARCHES = 60
+"""Without a start, in all images of a real set together."""
 STARTS_A_SLOW_ONE = 5
 """The best of 32 has this many times fewer starts, ..."""
-INSTANCES_A_PAPER = 12
+INSTANCES_A_PAPER = 24
 """... and one instance in so many has one for the paper's method."""
 INSTANCES_AN_AGREEMENT = 3
 """One synthetic instance in so many shows how the sparse agreement ranks poses."""
@@ -75,7 +84,7 @@ def measure(quick: bool) -> list[Figure]:
     """All figures; prints tables, and writes overlays where asked."""
     console = Console(highlight=False, width=max(Console().width, TABLE_WIDTH))
     try:
-        choice = Choice.read(SETS, available_methods())
+        choice = Choice.read(QUICK_SETS if quick else SETS, available_methods())
     except ValueError as error:
         raise SystemExit(str(error)) from error
     if not DATA.is_dir():
@@ -91,10 +100,12 @@ def measure(quick: bool) -> list[Figure]:
     trials = [trial for result in results for trial in result.trials]
     for name in choice.sets:
         print_tables(console, trials, name)
+    print_made_worse(console, [trial for trial in trials if trial.shell == GOOD])
+    own = [trial for trial in trials if trial.method == DEFAULT and trial.shell != GOOD]
+    print_confidences(console, own)
     for title, sets in (("synthetic", SYNTHETIC), ("real", REAL)):
-        own = [t for t in trials if t.method == DEFAULT and t.set_name in sets and t.shell != GOOD]
-        if own:
-            print_reliability(console, own, title)
+        if some := [trial for trial in own if trial.set_name in sets]:
+            print_reliability(console, some, title)
     if folder := os.environ.get(OVERLAYS_VARIABLE):
         write_overlays(Path(folder), instances, trials)
     return [*figures(results), *([] if choice.is_part else _beside_trials(instances, quick, console)), *timed]
@@ -102,30 +113,41 @@ def measure(quick: bool) -> list[Figure]:
 
 def _instances(choice: Choice, quick: bool) -> list[Instance]:
     scenes = QUICK_SCENES if quick else MOST_SCENES
-    found = [
-        synthetic_instances(name, AN_OBJECT, scenes) if name in SYNTHETIC else real_instances(name)
-        for name in choice.sets
-    ]
+    found = [_of_set(name, scenes) for name in choice.sets]
     return [one for own in found for one in (own[:1] if quick else own)]
+
+
+def _of_set(name: str, scenes: int) -> list[Instance]:
+    if name in PLAIN:
+        return synthetic_instances(name, AN_OBJECT, scenes)
+    if name in SENSORS:
+        return sensor_instances(name, OF_A_SENSOR, scenes)
+    return inexact_instances(OF_A_SENSOR, scenes) if name == INEXACT else real_instances(name)
 
 
 def _beside_trials(instances: Sequence[Instance], quick: bool, console: Console) -> list[Figure]:
     """What is measured of snaps without trials of single starts."""
-    print_agreement(
-        console, [one for one in instances if one.set_name in SYNTHETIC][::INSTANCES_AN_AGREEMENT]
-    )
-    on_views = view_figures(1 if quick else VIEW_STARTS)
-    seeds = 1 if quick else SEEDS
-    return [*on_views, *proposal_figures([one for one in instances if one.set_name == YCB], seeds)]
+    plain = [one for one in instances if one.set_name in PLAIN]
+    print_agreement(console, plain[::INSTANCES_AN_AGREEMENT])
+    searches = 1 if quick else SEARCHES
+    proposed = [
+        figure
+        for name in REAL
+        for figure in proposal_figures([one for one in instances if one.set_name == name], searches)
+    ]
+    return [*view_figures(quick), *proposed]
 
 
 def _plan(instance: Instance, number: int, choice: Choice) -> dict[Shell, Mapping[str, int]]:
     count = min(STARTS[instance.set_name], choice.starts or STARTS[instance.set_name])
-    fast = dict.fromkeys((NOTHING, ICP, GICP, PROTOTYPE, DEFAULT, TOLD), count)
-    slow = {BEST_OF: -(-count // STARTS_A_SLOW_ONE), PAPER: int(number % INSTANCES_A_PAPER == 0)}
+    fast = dict.fromkeys((NOTHING, GICP, PROTOTYPE, DEFAULT, TOLD), count)
+    slow = {
+        ICP: count,
+        BEST_OF: -(-count // STARTS_A_SLOW_ONE),
+        PAPER: int(number % INSTANCES_A_PAPER == 0),
+    }
     shells = SHELLS if instance.set_name in WIDELY_STARTED else SHELLS[:-1]
-    near = dict.fromkeys((NOTHING, GICP, PROTOTYPE, DEFAULT, TOLD), count)
-    plan = {**dict.fromkeys(shells, fast | slow), GOOD: near}
+    plan = {**dict.fromkeys(shells, fast | slow), GOOD: fast}
     return {
         shell: {name: n for name, n in counts.items() if name in choice.methods}
         for shell, counts in plan.items()

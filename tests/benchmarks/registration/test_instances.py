@@ -9,11 +9,15 @@ from benchmarks.registration.instances import (
     APC,
     BUNNY,
     HALF,
+    INEXACT,
     MORO,
     RBT,
+    SENSORS,
     YCB,
     Instance,
+    inexact_instances,
     real_instances,
+    sensor_instances,
     synthetic_instances,
 )
 from registration_core.rasterizer import render_depth
@@ -45,6 +49,26 @@ def test_synthetic_instances_are_always_the_same(few: list[Instance]) -> None:
     again = synthetic_instances(HALF, 1, most_scenes=1)
     assert [one.object_name for one in again] == [one.object_name for one in few]
     assert all(np.array_equal(a.depth, b.depth) for a, b in zip(again, few, strict=True))
+
+
+@pytest.mark.parametrize("set_name", SENSORS)
+def test_other_sensors_measure_the_same_scenes(set_name: str, few: list[Instance]) -> None:
+    measured = sensor_instances(set_name, 1, most_scenes=1)
+    assert [one.object_name for one in measured] == [one.object_name for one in few]
+    for one, plain in zip(measured, few, strict=True):
+        assert one.set_name == set_name and np.array_equal(one.perfect_depth, plain.perfect_depth)
+        assert not np.array_equal(one.depth, plain.depth)
+        drawn = render_depth(one.model, one.camera, one.truth)
+        seen = (drawn > 0) & (np.abs(one.perfect_depth - drawn) < 0.002) & (one.depth > 0)
+        assert seen.sum() > 0.2 * (drawn > 0).sum()
+        assert np.median(np.abs(one.depth - drawn)[seen]) < 0.015
+
+
+def test_inexact_meshes_are_off_by_a_little(few: list[Instance]) -> None:
+    for one, plain in zip(inexact_instances(1, most_scenes=1), few, strict=True):
+        assert one.set_name == INEXACT and one.depth is not None
+        off = np.linalg.norm(one.model.vertices - plain.model.vertices, axis=1).max()
+        assert 0.0 < off < 0.02 * plain.model.diameter
 
 
 @pytest.mark.parametrize(

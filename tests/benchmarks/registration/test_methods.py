@@ -1,11 +1,7 @@
 """Every method registers an object from nearby, and fits in one signature."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
-from PIL import Image
 
 from benchmarks.registration.ambiguity import fits_as_well
 from benchmarks.registration.instances import HALF, Instance
@@ -18,7 +14,7 @@ from benchmarks.registration.methods import (
     polished_truth,
     register,
 )
-from benchmarks.registration.overlays import MAGENTA, YELLOW, write_overlays
+from benchmarks.registration.several_views import turned_mug
 from benchmarks.registration.starts import SHELLS, starts
 from benchmarks.registration.trials import Trial, try_instance
 from registration_core import pose
@@ -74,31 +70,13 @@ def test_nothing_seen_changes_nothing(drill: Instance) -> None:
 
 def test_a_mug_with_its_handle_behind_fits_in_other_ways() -> None:
     T_camera_table = pose.exp([0.0, 0.0, 0.8, -2.1, 0.0, 0.0])
-    handle_behind, handle_in_view = (T_camera_table @ turned_mug(angle) for angle in (-90.0, 90.0))
-    assert fits_as_well(alone(handle_behind), T_camera_table @ turned_mug(-80.0))
+    handle_behind, handle_in_view = (
+        T_camera_table @ turned_mug(np.radians(angle)) for angle in (-90.0, 90.0)
+    )
+    assert fits_as_well(alone(handle_behind), T_camera_table @ turned_mug(np.radians(-80.0)))
     assert not fits_as_well(alone(handle_behind), handle_in_view)
     assert not fits_as_well(alone(handle_in_view), handle_behind)
-    assert not fits_as_well(alone(handle_in_view), T_camera_table @ turned_mug(60.0))
-
-
-def test_overlays_show_outlines_on_depth_and_on_colour(
-    drill: Instance, trials: list[Trial], tmp_path: Path
-) -> None:
-    color_path = tmp_path / "color.png"
-    Image.new("RGB", (drill.camera.width, drill.camera.height), (1, 2, 3)).save(color_path)
-    write_overlays(tmp_path / "out", [replace(drill, color_path=color_path)], trials)
-    (written,) = (tmp_path / "out").iterdir()
-    picture = np.asarray(Image.open(written).convert("RGB"))
-    assert written.name.startswith("right_one_drill_20mm")
-    for half in np.array_split(picture, 2, axis=1):
-        colors = {tuple(color) for color in half.reshape(-1, 3).tolist()}
-        assert {YELLOW, MAGENTA} <= colors
-
-
-def turned_mug(degrees: float) -> np.ndarray:
-    """The mug turned about the axis of its body, which is not that of its bounding box."""
-    T_axis = pose.exp([MUG.vertices[:, 0].min() + 0.0425, 0.0, 0.0, 0.0, 0.0, 0.0])
-    return T_axis @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, np.radians(degrees)]) @ pose.inverse(T_axis)
+    assert not fits_as_well(alone(handle_in_view), T_camera_table @ turned_mug(np.radians(60.0)))
 
 
 def alone(truth: np.ndarray) -> Instance:

@@ -9,6 +9,7 @@ from benchmarks.registration.statistics import (
     auroc,
     calibration_error,
     false_accepts,
+    measure_over_scenes,
     percentiles,
     reliability,
     share_over_scenes,
@@ -108,3 +109,17 @@ def test_values_of_one_scene_count_as_one() -> None:
 
 def test_percentiles() -> None:
     assert percentiles(range(101)) == (50.0, 95.0)
+
+
+def test_a_measure_has_an_interval_over_scenes() -> None:
+    scenes = [n // 20 for n in range(len(SCORES))]
+    share = measure_over_scenes(auroc, SCORES, RIGHT, scenes)
+    assert share.value == auroc(SCORES, RIGHT)
+    assert share.low < share.value < share.high
+    assert share == measure_over_scenes(auroc, SCORES, RIGHT, scenes)
+
+
+def test_the_interval_of_one_scene_is_a_point_and_of_nothing_wrong_unknown() -> None:
+    share = measure_over_scenes(auroc, SCORES, RIGHT, ["one"] * len(SCORES))
+    assert share.low == share.value == share.high
+    assert math.isnan(measure_over_scenes(auroc, [0.5, 0.6], [True, True], ["a", "b"]).low)

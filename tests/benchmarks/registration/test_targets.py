@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from benchmarks.figures import Figure
-from benchmarks.registration.instances import HALF
+from benchmarks.registration.instances import HALF, MORO
 from benchmarks.registration.judging import Error
-from benchmarks.registration.methods import DEFAULT, GICP, TOLD
-from benchmarks.registration.starts import GOOD, SHELLS, Shell
+from benchmarks.registration.methods import DEFAULT, GICP, PROTOTYPE, TOLD
+from benchmarks.registration.starts import GOOD, MIDDLE, SHELLS, Shell
 from benchmarks.registration.targets import figures
 from benchmarks.registration.trials import InstanceTrials, Trial
 
@@ -56,8 +56,8 @@ def test_peers(found: dict[str, Figure]) -> None:
 
 
 def test_confidence_is_judged_without_the_good_starts(found: dict[str, Figure]) -> None:
-    assert found["confidence, synthetic, AUROC"].value == 100.0
-    assert found["confidence, synthetic, wrong accepted with 90 % of the good"].value == 0.0
+    assert found["confidence, at least half visible, AUROC"].value == 100.0
+    assert found["confidence, at least half visible, wrong accepted with 90 % of the good"].value == 0.0
 
 
 def test_what_was_not_tried_has_no_figure(found: dict[str, Figure]) -> None:
@@ -67,4 +67,27 @@ def test_what_was_not_tried_has_no_figure(found: dict[str, Figure]) -> None:
 
 def test_confidence_needs_right_and_wrong_results() -> None:
     trials = [trial(SHELLS[0], n, DEFAULT, replace(RIGHT), 0.02, 0.9) for n in range(3)]
-    assert not any("confidence" in figure.name for figure in figures([InstanceTrials(trials, RIGHT)]))
+    names = [figure.name for figure in figures([InstanceTrials(trials, RIGHT)])]
+    assert [name for name in names if name.startswith("confidence")] == [
+        "confidence, at least half visible, calibration error"
+    ]
+
+
+def test_times_are_compared_from_the_same_starts() -> None:
+    trials = [
+        *(trial(SHELLS[0], n, DEFAULT, RIGHT, 0.02, 0.9) for n in range(3)),
+        *(trial(SHELLS[0], 3 + n, DEFAULT, RIGHT, seconds, 0.3) for n, seconds in enumerate((0.1, 0.1, 0.4))),
+        *(trial(SHELLS[0], n, PROTOTYPE, RIGHT, 0.05, 0.0) for n in range(3)),
+    ]
+    found = {figure.name: figure for figure in figures([InstanceTrials(trials, RIGHT)])}
+    assert found[
+        "synthetic, median time of a default snap, of that of the research prototype"
+    ].value == pytest.approx(0.4)
+    assert found["synthetic, p95 of snaps in doubt, of their median"].value == pytest.approx(3.7)
+
+
+def test_acceptance_is_judged_on_real_scenes() -> None:
+    real = [replace(trial(MIDDLE, n, DEFAULT, RIGHT, 0.02, 0.0), set_name=MORO) for n in range(4)]
+    found = {figure.name: figure for figure in figures([InstanceTrials(real, RIGHT)])}
+    accepted = found["acceptance(0.02), real, from 5 cm/30°, accepted"]
+    assert accepted.value == 0.0 and accepted.is_missed
