@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,8 +16,9 @@ from app.database import Database
 from app.scene_data import symmetries_to_json
 from app.start_pose import start_pose
 from app.storage import FileStore
-from app.tables import Dataset, Frame, Object, Scene, Task
-from registration_core import ObjectModel
+from app.symmetries import first_version, open_suggestions, suggest
+from app.tables import Dataset, Frame, Object, Scene, SymmetrySuggestions, Task
+from registration_core import ObjectModel, Symmetries
 from registration_core.bop import BopDataset, BopImage, BopObject, BopScene, read_dataset, read_depth
 
 Row = TypeVar("Row", Object, Scene, Frame, Task)
@@ -90,7 +92,12 @@ def import_dataset(
     if not worlds:
         raise DatasetImportError(f"{folder} has no scenes; a scene is a folder such as test/000001")
     stored = _store(files, source)
+    plain = {stored[o.mesh_path]: o.model for o in source.objects if o.model.symmetries == Symmetries()}
+    report = partial(progress, 1.0, "looking for symmetries") if progress else lambda: None
+    suggested = suggest(database, plain, report)
     with database.write() as session:
+        for mesh_hash, suggestions in suggested.items():
+            session.merge(SymmetrySuggestions(mesh_hash=mesh_hash, suggestions=suggestions))
         return _Importer(session, stored, name).run(source, worlds)
 
 
@@ -165,6 +172,7 @@ class _Importer:
         if row is not None:
             if row.model_hash != item.model.content_hash:
                 raise self._conflict(f"object {item.obj_id} with another mesh or other symmetries")
+            open_suggestions(self._session, row)
             return row
         row = Object(
             dataset_id=dataset.id,
@@ -176,7 +184,10 @@ class _Importer:
             diameter=item.model.diameter,
             symmetries=symmetries_to_json(item.model.symmetries),
         )
-        return self._add("objects", row)
+        self._add("objects", row)
+        first_version(self._session, row)
+        open_suggestions(self._session, row)
+        return row
 
     def _scene(self, dataset: Dataset, world: _World) -> Scene:
         key = {

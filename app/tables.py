@@ -111,8 +111,43 @@ class Object(Base):
     mesh_hash: Mapped[str] = mapped_column(String(64))
     mesh_format: Mapped[str] = mapped_column(String(10))
     model_hash: Mapped[str] = mapped_column(String(64))
+    """Of mesh and symmetries as they were imported."""
     diameter: Mapped[float] = mapped_column(Float)
     symmetries: Mapped[dict[str, Any]]
+    """The present ones: those of the newest `SymmetryVersion`."""
+    symmetries_version: Mapped[int] = mapped_column(default=1)
+    suggestions_open: Mapped[bool] = mapped_column(default=False)
+    """Whether it came without symmetries, some are suggested, and nobody has decided yet."""
+
+
+class SymmetryVersion(Base):
+    """What an object's symmetries were, from a time on. Append-only: a trigger refuses changes."""
+
+    __tablename__ = "symmetry_versions"
+    __table_args__ = (UniqueConstraint("object_id", "version"),)
+    id: Mapped[int] = mapped_column(primary_key=True)
+    object_id: Mapped[int] = mapped_column(ForeignKey("objects.id"))
+    version: Mapped[int]
+    """From 1 on, which is what was imported."""
+    symmetries: Mapped[dict[str, Any]]
+    axes: Mapped[list[Any] | None]
+    """The axes that somebody chose, which the symmetries were made of; None where they were imported."""
+    restores: Mapped[int | None]
+    """The version that this one brings back, itself no such one."""
+    user_id: Mapped[int | None] = mapped_column(ForeignKey("users.id"))
+    """Who decided; None for the import."""
+    utc: Mapped[datetime] = mapped_column(default=utc_now)
+    user: Mapped[User | None] = relationship()
+
+
+class SymmetrySuggestions(Base):
+    """The axes of symmetry that were found on a mesh, whichever objects have it."""
+
+    __tablename__ = "symmetry_suggestions"
+    mesh_hash: Mapped[str] = mapped_column(String(64), primary_key=True)
+    suggestions: Mapped[list[Any]]
+    """Best first: axis, point, fold and residual, metres."""
+    utc: Mapped[datetime] = mapped_column(default=utc_now)
 
 
 class Scene(Base):
@@ -257,6 +292,8 @@ class EstimateRow(Base):
     config: Mapped[dict[str, Any]]
     start_spread: Mapped[list[Any] | None]
     known_objects: Mapped[list[Any] | None]
+    symmetries_version: Mapped[int | None]
+    """Of the object's symmetries; None where an older version of Snap6D did not keep it."""
     version: Mapped[str] = mapped_column(String(40))
     algorithm: Mapped[str | None] = mapped_column(String(12))
     """`registration_core.ALGORITHM` where it was computed; None where an older version did not say."""

@@ -13,8 +13,9 @@ from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
 from registration_core.snap import snap, snap_steps
 from registration_core.snap_config import SnapConfig
-from registration_core.symmetry_group import SuggestedSymmetry, as_symmetries
-from registration_core.symmetry_search import find_symmetries
+from registration_core.symmetry_axes import axes_of, check_axes
+from registration_core.symmetry_group import SuggestedSymmetry, SymmetryAxis, as_symmetries
+from registration_core.symmetry_search import find_symmetries, residual_of
 from registration_core.views import snap_views, snap_views_steps
 
 __all__ = [
@@ -33,15 +34,19 @@ __all__ = [
     "SnapStep",
     "SuggestedSymmetry",
     "Symmetries",
+    "SymmetryAxis",
     "WorldEstimate",
     "acceptance",
     "as_symmetries",
+    "axes_of",
     "calibration_of",
+    "check_axes",
     "explained_pixels",
     "find_symmetries",
     "pose_from_correspondences",
     "propose",
     "region_of_interest",
+    "residual_of",
     "snap",
     "snap_steps",
     "snap_views",

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +26,15 @@ MOST_ROTATIONS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class SuggestedSymmetry:
-    """An axis about which a mesh can be turned onto itself."""
+class SymmetryAxis:
+    """An axis about which an object can be turned onto itself."""
 
     axis: Array
     """(3,), unit length, in the mesh frame."""
     origin: Array
-    """(3,), metres: the point of the axis that is nearest to the centroid of the surface."""
+    """(3,), metres: a point of the axis; the one nearest to the surface's centroid where it was suggested."""
     fold: int | None
     """Turns by 1 / fold of a full turn; None: by any angle."""
-    residual: float
-    """Metres: 99 % of the turned surface is nearer than this to the surface, after each of `transforms`."""
 
     @property
     def transforms(self) -> Array:
@@ -43,8 +42,19 @@ class SuggestedSymmetry:
         return turns(self.axis, self.origin, angles_of(self.fold))
 
 
-def as_symmetries(suggestions: Sequence[SuggestedSymmetry]) -> Symmetries:
-    """The symmetries that accepted suggestions amount to, as BOP writes them.
+@dataclass(frozen=True, eq=False)
+class SuggestedSymmetry(SymmetryAxis):
+    """An axis that was found on a mesh."""
+
+    residual: float
+    """Metres: 99 % of the turned surface is nearer than this to the surface, after each of `transforms`."""
+
+
+Axis = TypeVar("Axis", bound=SymmetryAxis)
+
+
+def as_symmetries(suggestions: Sequence[SymmetryAxis]) -> Symmetries:
+    """The symmetries that accepted suggestions, or other axes, amount to, as BOP writes them.
 
     Discrete axes give every rotation that can be composed of theirs: the three half turns of a box, 23
     rotations of a cube. With one axis of revolution, the flip is discrete, if there is one: BOP multiplies
@@ -76,17 +86,17 @@ def closed(transforms: Sequence[Array]) -> list[Array]:
             continue
         elements.append(T)
         if len(elements) > MOST_ROTATIONS:
-            raise ValueError("suggestions contradict each other: turns about their axes never close a cycle")
+            raise ValueError("axes contradict each other: turns about them never close a cycle")
         pending += [product for E in elements for product in (T @ E, E @ T)]
     return elements[1:]
 
 
-def order(suggestion: SuggestedSymmetry) -> float:
+def order(suggestion: SymmetryAxis) -> float:
     """Number of rotations about its axis."""
     return np.inf if suggestion.fold is None else suggestion.fold
 
 
-def flips(suggestions: Sequence[SuggestedSymmetry], revolution: SuggestedSymmetry) -> list[SuggestedSymmetry]:
+def flips(suggestions: Sequence[Axis], revolution: SymmetryAxis) -> list[Axis]:
     """Those that turn over an axis of revolution: half turns about an axis across it."""
     return [
         s

@@ -21,6 +21,7 @@ from registration_core.object_model import ObjectModel
 from registration_core.symmetry_group import (
     SAME_AXIS,
     SuggestedSymmetry,
+    SymmetryAxis,
     angles_of,
     axis_rotations,
     flips,
@@ -109,7 +110,7 @@ def find_symmetries(
     model = ObjectModel(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int32))
     triangles = model.vertices[model.faces]
     areas = trimesh.triangles.area(triangles)
-    centroid = np.average(triangles.mean(axis=1), axis=0, weights=areas)
+    centroid = centroid_of(triangles, areas)
     surface = surface_of((model.vertices - centroid) / model.diameter, model.faces)
     spreads, axes = principal_axes((triangles - centroid) / model.diameter, areas)
     found: list[SuggestedSymmetry] = []
@@ -121,6 +122,20 @@ def find_symmetries(
         SuggestedSymmetry(s.axis, s.origin * model.diameter + centroid, s.fold, s.residual * model.diameter)
         for s in best_first
     )
+
+
+def residual_of(model: ObjectModel, axis: SymmetryAxis) -> float:
+    """How far turns about an axis carry the surface off itself, metres, as `find_symmetries` measures it."""
+    triangles = model.vertices[model.faces]
+    centroid = centroid_of(triangles, trimesh.triangles.area(triangles))
+    surface = surface_of((model.vertices - centroid) / model.diameter, model.faces)
+    origin = (axis.origin - centroid) / model.diameter
+    return model.diameter * residual(surface, axis.axis, origin, angles_of(axis.fold), ALL)
+
+
+def centroid_of(triangles: Array, areas: Array) -> Array:
+    """The centroid (3,) of a surface of triangles (F, 3, 3) with these areas (F,)."""
+    return np.average(triangles.mean(axis=1), axis=0, weights=areas)
 
 
 def surface_of(vertices: Array, faces: NDArray[np.int32]) -> Surface:

@@ -10,12 +10,15 @@ from app.analysis.collect import Collected, TruthSource, trials_of
 from app.analysis.remarks import Remark
 from app.analysis.team import Work, work_of
 from app.database import Database
-from app.tables import OfflineSnap, Participant, Registration, Study, Trial
+from app.tables import OfflineSnap, Participant, Registration, Study, SymmetryVersion, Trial
 
 Value = TypeVar("Value")
 
 LATEST = (func.count(), func.max(Registration.submitted_at), func.max(Registration.id))
 """Of submitted registrations: only these count, and whoever goes on with one submits it again."""
+
+DECIDED = select(func.count(SymmetryVersion.id))
+"""Errors are up to the symmetries of objects."""
 
 
 class Kept:
@@ -70,8 +73,10 @@ class Kept:
                 session.execute(
                     select(Participant.id, Participant.group, Participant.withdrawn_at).where(of_study)
                 ).all(),
+                session.execute(DECIDED).one(),
             )
 
     def _team_state(self) -> object:
         with self._database.read() as session:
-            return session.execute(select(*LATEST).where(Registration.state == "submitted")).one()
+            latest = session.execute(select(*LATEST).where(Registration.state == "submitted")).one()
+            return latest, session.execute(DECIDED).one()

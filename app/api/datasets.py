@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, HTTPException, Request
 from fastapi.concurrency import run_in_threadpool
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from sqlalchemy import distinct, func, select
 from sqlalchemy.orm import Session
 from starlette.datastructures import UploadFile
@@ -58,6 +58,7 @@ class DatasetOut(BaseModel):
     id: int
     name: str
     objects: int
+    suggestions_open: int = Field(description="Objects whose suggested symmetries wait for a decision.")
     scenes: int
     tasks: int
     tasks_submitted: int
@@ -125,10 +126,12 @@ def _out(session: Session, row: Dataset) -> DatasetOut:
         .join(Task.scene)
         .where(Scene.dataset_id == row.id, Registration.state == "submitted", OUTSIDE_STUDIES)
     )
+    objects = select(func.count(Object.id)).where(Object.dataset_id == row.id)
     return DatasetOut(
         id=row.id,
         name=row.name,
-        objects=session.scalar(select(func.count(Object.id)).where(Object.dataset_id == row.id)) or 0,
+        objects=session.scalar(objects) or 0,
+        suggestions_open=session.scalar(objects.where(Object.suggestions_open)) or 0,
         scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
         tasks=session.scalar(tasks) or 0,
         tasks_submitted=session.scalar(submitted) or 0,

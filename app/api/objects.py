@@ -4,7 +4,7 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 from fastapi.responses import FileResponse
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 from sqlalchemy import select
 
 from app.api.dependencies import (
@@ -24,6 +24,7 @@ from app.api.scenes import FOREVER
 from app.auth import Identity
 from app.outline_mesh import packed
 from app.services import Services
+from app.symmetries import present_axes, suggestions_of, version_before
 from app.tables import Object, Task
 from registration_core.object_model import read_mesh
 
@@ -38,9 +39,40 @@ class ObjectOut(BaseModel):
     obj_id: int
     name: str
     diameter: float
-    symmetries: dict[str, Any]
+    symmetries: dict[str, Any] = Field(description="The present ones, as BOP writes them, but in metres.")
+    symmetries_version: int
+    suggestions_open: bool = Field(
+        description="It came without symmetries, some are suggested, and nobody has decided yet."
+    )
     mesh_url: str
     outline_mesh_url: str
+
+
+class AxisOut(BaseModel):
+    """An axis of symmetry."""
+
+    axis: tuple[float, float, float] = Field(description="Its direction.")
+    point: tuple[float, float, float] = Field(description="A point that it goes through.")
+    fold: int | None = Field(description="It turns by 1 / fold of a full turn; null: by any angle.")
+
+
+class SuggestionOut(AxisOut):
+    """One that was found on the mesh."""
+
+    residual: float = Field(description="99 % of the turned surface is nearer than this to the surface.")
+
+
+class ObjectDetail(ObjectOut):
+    """The same with its size and its axes of symmetry."""
+
+    size: tuple[float, float, float] = Field(description="Along the axes of the mesh.")
+    centre: tuple[float, float, float] = Field(description="Of the box along these axes.")
+    axes: list[AxisOut] = Field(description="Which the present symmetries are made of.")
+    suggestions: list[SuggestionOut] | None = Field(
+        description="Best first; null where the mesh was never looked into: it came with symmetries, or was "
+        "imported by an older version; then import it again."
+    )
+    undo_version: int | None = Field(description="The version that undo restores.")
 
 
 @router.get("")
@@ -48,11 +80,14 @@ def list_objects(
     services: ServicesDep,
     _identity: IdentityDep,
     dataset_id: QueryId = None,
+    suggestions_open: bool | None = None,
     after: AfterDep = 0,
     limit: LimitDep = 100,
 ) -> Page:
-    """All objects, or those of one dataset."""
+    """All objects, or those of one dataset, or those whose suggested symmetries wait for a decision."""
     query = select(Object)
+    if suggestions_open is not None:
+        query = query.where(Object.suggestions_open == suggestions_open)
     if dataset_id is not None:
         query = query.where(Object.dataset_id == dataset_id)
     with services.database.read() as session:
@@ -60,9 +95,9 @@ def list_objects(
 
 
 @router.get("/{object_id}")
-def get_object(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> ObjectOut:
+def get_object(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> ObjectDetail:
     """One object."""
-    return _out(_object(services, object_id, identity))
+    return detail_of(services, _object(services, object_id, identity))
 
 
 @router.get("/{object_id}/mesh.ply", response_class=Response)
@@ -83,6 +118,21 @@ def get_outline_mesh(object_id: Id, services: ServicesDep, identity: AnyoneDep) 
     return Response(content, media_type="application/octet-stream", headers=FOREVER)
 
 
+def detail_of(services: Services, row: Object) -> ObjectDetail:
+    """An object as JSON, with all that is known of it."""
+    vertices = services.data.model(row).vertices
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    with services.database.read() as session:
+        return ObjectDetail(
+            **_out(row).model_dump(),
+            size=(high - low).tolist(),
+            centre=((low + high) / 2.0).tolist(),
+            axes=present_axes(session, row),
+            suggestions=suggestions_of(session, row),
+            undo_version=version_before(session, row),
+        )
+
+
 def _object(services: Services, object_id: int, identity: Identity) -> Object:
     check_sees(services, identity, Task.object_id == object_id, f"object {object_id}")
     with services.database.read() as session:
@@ -97,6 +147,8 @@ def _out(row: Object) -> ObjectOut:
         name=row.name,
         diameter=row.diameter,
         symmetries=row.symmetries,
+        symmetries_version=row.symmetries_version,
+        suggestions_open=row.suggestions_open,
         mesh_url=f"/api/objects/{row.id}/mesh.ply",
         outline_mesh_url=f"/api/objects/{row.id}/outline.mesh?content={row.mesh_hash[:16]}",
     )

@@ -16,6 +16,7 @@ from app.auth import SignInError, TooManyAttemptsError
 from app.labeling.desk import NotFoundError
 from app.labeling.track import ActionError
 from app.study.plan import StudyError
+from app.symmetries import OutdatedError
 
 logger = logging.getLogger(__name__)
 
@@ -71,6 +72,7 @@ def install(app: FastAPI) -> None:
         (ActionError, HTTPStatus.CONFLICT),
         (InputError, HTTPStatus.UNPROCESSABLE_ENTITY),
         (StudyError, HTTPStatus.CONFLICT),
+        (OutdatedError, HTTPStatus.CONFLICT),
         (TooManyAttemptsError, HTTPStatus.TOO_MANY_REQUESTS),
         (SignInError, HTTPStatus.UNAUTHORIZED),
     ):

@@ -96,6 +96,7 @@ class RegistrationOut(BaseModel):
     offer: OfferOut | None
     is_live: bool
     live: LiveOut | None
+    symmetries_version: int = Field(description="Of the object's symmetries, which the next snap uses.")
     estimate_snap_id: str | None = Field(description="The snap that the pose stems from.")
     search: SearchOut | None
     preview: Pose | None = Field(description="T_world_object that is looked at before it is taken.")
@@ -134,6 +135,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         offer=_offer_out(state),
         is_live=state.is_live,
         live=_live_out(state),
+        symmetries_version=seat.object.present.symmetries_version,
         estimate_snap_id=state.estimate_snap_id,
         search=_search_out(state),
         preview=None if state.preview is None else state.preview.tolist(),

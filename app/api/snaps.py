@@ -100,6 +100,9 @@ class EstimateOut(BaseModel):
     known_objects: list[KnownObjectOut] | None = Field(
         description="Objects of the scene that the snap knew; null where an older version did not say."
     )
+    symmetries_version: int | None = Field(
+        description="Of the object's symmetries; null where an older version did not keep it."
+    )
     version: str
     algorithm: str | None = Field(
         description="A hash of the sources and fitted numbers that computed it: with the same one, inputs "

@@ -17,10 +17,10 @@ from app.labeling.dispatch import Dispatch
 from app.labeling.history import replay
 from app.labeling.live_view import view_of
 from app.labeling.neighbours import Neighbours
-from app.labeling.same_pose import same_pose_of
 from app.labeling.scene_things import things_of_scene
 from app.labeling.seat import Seat
 from app.labeling.session import LabelingSession
+from app.labeling.session_object import SessionObject
 from app.labeling.session_state import SessionState
 from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
@@ -28,7 +28,7 @@ from app.memory import give_back
 from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import Snapper
-from app.tables import Condition, EstimateRow, Method, Registration, Task
+from app.tables import Condition, EstimateRow, Method, Object, Registration, Task
 
 logger = logging.getLogger(__name__)
 
@@ -140,6 +140,20 @@ class Desk:
         for seat in theirs:
             seat.close()
 
+    def renew_object(self, object_id: int) -> None:
+        """Let the sessions of an object go on with its present symmetries, and tell them."""
+        with self._lock:
+            with self._database.read() as session:
+                row = session.get_one(Object, object_id)
+            model = self._data.model(row)
+            seats = [seat for seat in self._seats.values() if seat.registration.task.object_id == object_id]
+            for seat in seats:
+                seat.object.renew(model, row.symmetries_version)
+        if seats:
+            self._snapper.prepare(model)
+        for seat in seats:
+            seat.session.tell()
+
     def close_idle(self, idle_seconds: float = IDLE_SECONDS) -> int:
         """Close sessions that nobody watches and nobody used lately; returns how many."""
         oldest = time.monotonic() - idle_seconds
@@ -174,6 +188,7 @@ class Desk:
         for event in events:
             frame_id = event.detail["frame_id"] if event.kind == "frame" else frame_id
         model = self._data.model(task.object)
+        sought = SessionObject(model, task.object.symmetries_version)
         self._snapper.prepare(model)
         neighbours = Neighbours(lambda: things_of_scene(self._database, self._data, registration), self._data)
 
@@ -182,7 +197,7 @@ class Desk:
             if event.kind in STATE_AFTER:
                 self._renew_scene(task.scene_id)
 
-        dispatch = Dispatch(self._snapper, self._data, frames, model, neighbours)
+        dispatch = Dispatch(self._snapper, self._data, frames, sought, neighbours)
         session = LabelingSession(
             registration_id=registration.id,
             history=replay(np.array(task.T_world_object_start), events),
@@ -191,7 +206,7 @@ class Desk:
             frame_ids=tuple(frames),
             pivot=model.centre,
             condition=cast(Condition, task.condition),
-            same_pose=same_pose_of(model),
+            same_pose=sought.same_pose,
             record_event=record_event,
             request_snap=dispatch.snap,
             skip_reason=registration.skip_reason,
@@ -207,7 +222,7 @@ class Desk:
             return DepthView(self._data.depth(frame), camera_of(frame), np.array(frame.T_world_camera))
 
         reading = DepthReading(lambda: self._data.thinned_model(task.object), depth_view)
-        return Seat(registration, session, frames, model, neighbours, reading)
+        return Seat(registration, session, frames, sought, neighbours, reading)
 
     def _renew_scene(self, scene_id: int) -> None:
         """Tell all who work in a scene that something in it was submitted, skipped or reopened."""

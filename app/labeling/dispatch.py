@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from app import __version__
 from app.labeling.neighbours import Neighbours
 from app.labeling.search import SearchOrder, SearchResult
+from app.labeling.session_object import SessionObject
 from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
@@ -27,7 +28,7 @@ class Dispatch:
         snapper: Runs jobs.
         data: Where depth comes from.
         frames: The scene's frames, by id.
-        model: What is looked for.
+        sought: What is looked for.
         neighbours: Tells which pixels other objects explain.
     """
 
@@ -36,13 +37,13 @@ class Dispatch:
         snapper: Snapper,
         data: SceneData,
         frames: Mapping[int, Frame],
-        model: ObjectModel,
+        sought: SessionObject,
         neighbours: Neighbours,
     ) -> None:
         self._snapper = snapper
         self._data = data
         self._frames = frames
-        self._model = model
+        self._sought = sought
         self._neighbours = neighbours
 
     def snap(
@@ -53,21 +54,23 @@ class Dispatch:
     ) -> Callable[[], None]:
         """Let a worker look for a better pose; returns a function that cancels it."""
         T_world_camera = np.array(self._frames[order.frame_id].T_world_camera)
+        sought = self._sought.present
 
         def ended(outcome: JobResult | SnapError) -> None:
             if isinstance(outcome, SnapError):
                 on_end(SnapFailure(str(outcome)))
                 return
             T_world_object = T_world_camera @ outcome.estimate.T_camera_object
-            on_end(SnapResult(outcome.estimate, T_world_object, __version__, outcome.hardware))
+            version = sought.symmetries_version
+            on_end(SnapResult(outcome.estimate, T_world_object, version, __version__, outcome.hardware))
 
         try:
-            job = self._snap_job(order, pose.inverse(T_world_camera) @ order.T_world_object)
+            job = self._snap_job(order, pose.inverse(T_world_camera) @ order.T_world_object, sought.model)
         except ValueError as error:
             on_end(SnapFailure(f"The snap cannot work on this: {error}."))
             return lambda: None
         priority = LIVE_PRIORITY if order.is_live else 0
-        return self._snapper.request(job, self._model, on_progress, ended, priority)
+        return self._snapper.request(job, sought.model, on_progress, ended, priority)
 
     def search(
         self,
@@ -84,21 +87,24 @@ class Dispatch:
             made_by = __version__, outcome.algorithm, outcome.hardware
             on_end(SearchResult(outcome.hypotheses, outcome.seconds, *made_by))
 
-        return self._snapper.request(self._search_job(order), self._model, on_progress, ended)
+        model = self._sought.present.model
+        return self._snapper.request(self._search_job(order, model), model, on_progress, ended)
 
-    def _snap_job(self, order: SnapOrder, T_camera_object: NDArray[np.float64]) -> SnapJob:
+    def _snap_job(
+        self, order: SnapOrder, T_camera_object: NDArray[np.float64], model: ObjectModel
+    ) -> SnapJob:
         frame = self._frames[order.frame_id]
         explained = self._neighbours.explained(frame, order.known)
         camera = camera_of(frame)
         whole = self._data.depth(frame)
-        left, top, width, height = region_of_interest(self._model, camera, T_camera_object, order.config)
+        left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
         if not whole[top : top + height, left : left + width].any():
             left, top, (height, width) = 0, 0, whole.shape  # nothing near is no error, nothing seen at all is
         rows, columns = slice(top, top + height), slice(left, left + width)
         return SnapJob(
             snap_id=order.snap_id,
             topic="" if order.is_live else self._snapper.topic,
-            model_hash=self._model.content_hash,
+            model_hash=model.content_hash,
             depth=np.ascontiguousarray(whole[rows, columns]),
             camera=camera.cropped(left, top, width, height),
             explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
@@ -108,14 +114,14 @@ class Dispatch:
             start_spread=order.start_spread,
         )
 
-    def _search_job(self, order: SearchOrder) -> SearchJob:
+    def _search_job(self, order: SearchOrder, model: ObjectModel) -> SearchJob:
         frame = self._frames[order.frame_id]
         explained = self._neighbours.explained(frame, order.known)
         depth = self._data.depth(frame)
         return SearchJob(
             snap_id=order.search_id,
             topic=self._snapper.topic,
-            model_hash=self._model.content_hash,
+            model_hash=model.content_hash,
             depth=depth if explained is None else np.where(explained, 0.0, depth),
             camera=camera_of(frame),
             config=order.config,

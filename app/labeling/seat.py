@@ -7,6 +7,7 @@ from app.labeling.chair import Chair
 from app.labeling.depth_reading import DepthReading
 from app.labeling.neighbours import Neighbours
 from app.labeling.session import LabelingSession
+from app.labeling.session_object import SessionObject
 from app.labeling.view import SceneView
 from app.tables import Frame, Registration
 from registration_core import ObjectModel
@@ -19,7 +20,7 @@ class Seat:
     registration: Registration
     session: LabelingSession
     frames: dict[int, Frame]
-    model: ObjectModel
+    object: SessionObject
     neighbours: Neighbours
     reading: DepthReading
     view: SceneView | None = None
@@ -29,6 +30,11 @@ class Seat:
     """Open connections of the 3-D view."""
     chair: Chair = field(default_factory=Chair)
     lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def model(self) -> ObjectModel:
+        """The object, with its present symmetries."""
+        return self.object.present.model
 
     def close(self) -> None:
         """End the session, and its view with it."""

@@ -47,6 +47,8 @@ class SnapResult:
 
     estimate: Estimate
     T_world_object: Array
+    symmetries_version: int
+    """Of the object, that it was found with."""
     version: str
     hardware: str
 
@@ -140,6 +142,7 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         config=order.config.to_dict(),
         start_spread=stored_spread(order.start_spread),
         known_objects=stored_known(order.known),
+        symmetries_version=result.symmetries_version,
         version=result.version,
         algorithm=estimate.algorithm,
         hardware=result.hardware,

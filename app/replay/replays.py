@@ -66,14 +66,14 @@ class Replays:
         return self._data.model(registration.task.object)
 
     def open(self, registration_id: int, user_id: int) -> Replay:
-        """This user's replay, with what the log holds by now."""
+        """This user's replay, with what the log and the object's symmetries are by now."""
         registration, recording = self.recorded(registration_id)
         with self._lock:
             replay = self._replays.get((registration_id, user_id))
             if replay is None:
                 replay = self._make(registration, recording)
                 self._replays[registration_id, user_id] = replay
-            replay.recording = recording
+            replay.recording, replay.model = recording, self.model(registration)
         return replay
 
     def get(self, registration_id: int, user_id: int) -> Replay:

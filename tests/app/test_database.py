@@ -276,6 +276,7 @@ def test_estimates_of_the_first_version_stay_as_they_are_and_say_no_more(first_v
     with first_version.read() as session:
         (row,) = session.scalars(select(EstimateRow)).all()
     assert row.start_spread is None and row.ambiguities is None and row.known_objects is None
+    assert row.symmetries_version is None
     for statement in (update(EstimateRow).values(start_spread=[0.1, 0.1]), delete(EstimateRow)):
         with pytest.raises(DBAPIError, match="append-only"), first_version.write() as session:
             session.execute(statement)

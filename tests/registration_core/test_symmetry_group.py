@@ -91,5 +91,5 @@ def test_a_sphere_has_its_axes_side_by_side() -> None:
 
 
 def test_refuses_axes_that_contradict_each_other() -> None:
-    with pytest.raises(ValueError, match="suggestions contradict each other"):
+    with pytest.raises(ValueError, match="axes contradict each other"):
         as_symmetries([about(Z, 5), about([0.0, np.sin(0.7), np.cos(0.7)], 7)])

@@ -24,7 +24,9 @@ def test_objects_tell_their_names_and_sizes(objects: list[dict], operator: httpx
         model = ObjectModel.load(demo / f"models/obj_{item['obj_id']:06d}.ply", unit="mm")
         assert item["diameter"] == pytest.approx(model.diameter, rel=1e-3)
         assert item["symmetries"] == {"discrete": [], "continuous": []}
-        assert operator.get(f"/api/objects/{item['id']}").json() == item
+        detail = operator.get(f"/api/objects/{item['id']}").json()
+        assert detail | item == detail
+        assert detail["size"] == pytest.approx(np.ptp(model.vertices, axis=0))
 
 
 def test_a_mesh_is_the_bytes_that_were_imported(

@@ -122,7 +122,7 @@ def result(T: np.ndarray, confidence: float = 0.9, certificates: Certificates = 
         ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
     )
-    return SnapResult(estimate, T, "1.2.3", "a test machine")
+    return SnapResult(estimate, T, 3, "1.2.3", "a test machine")
 
 
 class Bench:

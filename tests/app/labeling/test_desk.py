@@ -5,7 +5,9 @@ import pytest
 
 from app.auth import Actor, Role
 from app.labeling.desk import NotFoundError
-from registration_core import SnapConfig, pose
+from app.symmetries import decide
+from app.tables import Object
+from registration_core import SnapConfig, SymmetryAxis, pose
 from tests.app.labeling.seats import shown, sign_up
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.rest import SLOW_SNAP
@@ -113,3 +115,22 @@ def test_the_view_is_made_once_and_goes_with_the_session(services, seat, ann):
     again = services.desk.seat(seat.registration.id, ann)
     with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(again)}/") as client:
         client.node("MeshMessage", "/object/mesh")
+
+
+def test_sessions_of_an_object_go_on_with_symmetries_that_are_decided_meanwhile(services, seat, ann):
+    other = services.desk.start(2, ann)
+    told = []
+    seat.session.subscribe(told.append)
+    T_turned = shown(seat) @ pose.exp([0, 0, 0, 0, 0, np.pi])
+    before = seat.model
+    assert not seat.object.same_pose(shown(seat), T_turned)
+    with services.database.write() as session:
+        row = session.get_one(Object, seat.registration.task.object_id)
+        decide(session, row, [SymmetryAxis(np.array([0.0, 0, 1]), np.zeros(3), 2)], before, ann.user_id, 1)
+    services.desk.renew_object(row.id)
+    assert len(told) == 1
+    assert seat.object.present.symmetries_version == 2 and len(seat.model.symmetry_transforms) == 2
+    assert seat.object.same_pose(shown(seat), T_turned)
+    assert other.object.present.symmetries_version == 1
+    services.desk.close_idle(0.0)
+    assert services.desk.seat(seat.registration.id, ann).object.present.symmetries_version == 2
