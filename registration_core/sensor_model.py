@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter, maximum_filter, minimum_filter
+from scipy.special import ndtr
 
 from registration_core.camera import Intrinsics
 from registration_core.kernels import EXACT
@@ -89,15 +90,15 @@ class Sensor:
     """How far to the right of the camera stands the projector or second camera, metres: what it does not see
     is lost."""
     grazing: float = 0.0
-    """Cosine between surface normal and ray under which holes begin; at 0 there is nothing but holes."""
+    """Cosine between surface normal and ray under which holes begin; where it is 0 nothing is measured."""
+    patches: float = 0.0
+    """Share of the image that is lost in patches, as dark and shiny surfaces leave them."""
+    patch_radius: float = 0.0
+    """About half the width of such a patch, and of one where light grazes, pixels; 0: each pixel alone."""
     speckle_holes: float = 0.0
     """Share of single pixels that are lost anywhere."""
     blobs: int = 0
     """Largest number of round holes in an image."""
-    patches: float = 0.0
-    """Share of the image that is lost in patches, as dark and shiny surfaces leave them."""
-    patch_radius: float = 6.0
-    """About half the width of a patch, pixels."""
     lines: float = 0.0
     """Pixels from one lost line to the next, in columns and in rows: a pattern coarser than the image."""
     farthest: float = 4.0
@@ -276,20 +277,29 @@ def holes(depth: DepthImage, camera: Intrinsics, sensor: Sensor, rng: np.random.
     if sensor.rim_holes > 0.0:
         width = sensor.rim_holes * (1.0 + field(depth.shape, sensor.rim_radius, rng))
         lost |= distance_transform_edt(~at_edges(depth, sensor.edge)) + 0.5 < width
-    if sensor.grazing > 0.0:
-        lost |= rng.random(depth.shape) > facing(depth, camera) / sensor.grazing
+    if sensor.grazing > 0.0 or sensor.patches > 0.0:
+        lost |= in_patches(depth, camera, sensor, rng)
     if sensor.speckle_holes > 0.0:
         lost |= rng.random(depth.shape) < sensor.speckle_holes
     if sensor.blobs > 0:
         lost |= round_holes(depth.shape, int(rng.integers(sensor.blobs + 1)), rng)
-    if sensor.patches > 0.0:
-        height = field(depth.shape, sensor.patch_radius, rng)
-        lost |= height > np.quantile(height, 1.0 - sensor.patches)
     if sensor.lines > 0.0:
         lost |= between_lines(depth.shape, sensor.lines, rng)
     if sensor.baseline != 0.0:
         lost |= in_shadow(depth, camera, sensor.baseline)
     return lost
+
+
+def in_patches(depth: DepthImage, camera: Intrinsics, sensor: Sensor, rng: np.random.Generator) -> Mask:
+    """Pixels (H, W) where too little light comes back, more of them where it grazes."""
+    if sensor.patch_radius > 0.0:
+        luck = ndtr(field(depth.shape, sensor.patch_radius, rng))
+    else:
+        luck = rng.random(depth.shape)
+    seen = np.full(depth.shape, 1.0 - sensor.patches)
+    if sensor.grazing > 0.0:
+        seen *= np.minimum(facing(depth, camera) / sensor.grazing, 1.0)
+    return np.asarray(luck > seen)
 
 
 def at_edges(depth: DepthImage, edge: float) -> Mask:

@@ -45,15 +45,15 @@ class RealSet:
 
 REAL = {
     "ycbv": RealSet(1, "structured light"),
-    "bunny": RealSet(3, "structured light"),
-    "moro": RealSet(1, "active stereo"),
-    "rbt": RealSet(5, "active stereo"),
+    "bunny": RealSet(6, "structured light"),
+    "moro": RealSet(2, "active stereo"),
+    "rbt": RealSet(10, "active stereo"),
     "apc": RealSet(1, "line pattern"),
 }
 SYNTHETIC = "synthetic scenes"
 LAYOUT = Layout(distance=(0.4, 1.0))
-SCENES, OBJECTS_A_SCENE = 10, 4
-DRAWS, QUICK_DRAWS = 3, 1
+SCENES, OBJECTS_A_SCENE = 5, 4
+DRAWS, QUICK_DRAWS = 2, 1
 """Sensors of each family for each image."""
 NEARBY, SMOOTH = 8, 9
 """Pixels around objects where a real background is not trusted, and over which it is smoothed."""

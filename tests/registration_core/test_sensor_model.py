@@ -211,8 +211,14 @@ def test_lines_are_lost_at_their_period():
     assert lost.all(axis=0).sum() == pytest.approx(160 / 5, abs=1)
 
 
-def test_patches_are_as_many_and_as_wide_as_wanted():
-    lost = measured(wall(1.0), patches=0.1, patch_radius=6.0) == 0.0
-    assert lost.mean() == pytest.approx(0.1, abs=0.001)
-    changes = np.count_nonzero(np.diff(lost, axis=1))
-    assert lost.sum() / (changes / 2) > 4.0
+@pytest.mark.parametrize("errors", [{"patches": 0.1}, {"grazing": 0.5}])
+def test_holes_come_in_patches_as_many_and_as_wide_as_wanted(errors):
+    depth = slanted(1.1) if "grazing" in errors else wall(1.0)
+    part = (slice(None), slice(60, 100))
+    widths = []
+    for radius in (0.0, 4.0):
+        lost = (measured(depth, patch_radius=radius, **errors) == 0.0)[part]
+        assert lost.mean() == pytest.approx(0.1, abs=0.06)
+        widths.append(2.0 * lost.sum() / np.count_nonzero(np.diff(lost, axis=1)))
+    assert widths[0] < 2.0
+    assert widths[1] > 4.0
