@@ -21,9 +21,13 @@ class Choice:
 
     @classmethod
     def read(
-        cls, sets: Sequence[str], methods: Sequence[str], environment: Mapping[str, str] = os.environ
+        cls,
+        sets: Sequence[str],
+        usual_sets: Sequence[str],
+        methods: Sequence[str],
+        environment: Mapping[str, str] = os.environ,
     ) -> "Choice":
-        """All of the given sets and methods, but for what environment variables say.
+        """The usual ones of the given sets, and all methods, but for what environment variables say.
 
         `BENCHMARK_SETS=moro,apc`, `BENCHMARK_METHODS=default,prototype`: names, or parts of names, which mean
         all that hold them. `BENCHMARK_STARTS=2`.
@@ -35,17 +39,19 @@ class Choice:
         if starts is not None and not (starts.isdecimal() and int(starts) > 0):
             raise ValueError(f"{STARTS_VARIABLE} must be a whole number from 1 on; it is {starts!r}")
         return cls(
-            _chosen(SETS_VARIABLE, sets, environment),
-            _chosen(METHODS_VARIABLE, methods, environment),
+            _chosen(SETS_VARIABLE, sets, usual_sets, environment),
+            _chosen(METHODS_VARIABLE, methods, methods, environment),
             int(starts) if starts is not None else None,
             any(name in environment for name in (SETS_VARIABLE, METHODS_VARIABLE, STARTS_VARIABLE)),
         )
 
 
-def _chosen(variable: str, names: Sequence[str], environment: Mapping[str, str]) -> tuple[str, ...]:
+def _chosen(
+    variable: str, names: Sequence[str], usual: Sequence[str], environment: Mapping[str, str]
+) -> tuple[str, ...]:
     text = environment.get(variable)
     if text is None:
-        return tuple(names)
+        return tuple(usual)
     chosen: list[str] = []
     for part in text.split(","):
         wanted = part.strip().lower()

@@ -84,7 +84,7 @@ def measure(quick: bool) -> list[Figure]:
     """All figures; prints tables, and writes overlays where asked."""
     console = Console(highlight=False, width=max(Console().width, TABLE_WIDTH))
     try:
-        choice = Choice.read(QUICK_SETS if quick else SETS, available_methods())
+        choice = Choice.read(SETS, QUICK_SETS if quick else SETS, available_methods())
     except ValueError as error:
         raise SystemExit(str(error)) from error
     if not DATA.is_dir():

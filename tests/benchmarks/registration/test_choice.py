@@ -11,7 +11,8 @@ SETS, METHODS = (
 
 
 def test_all_is_run_unless_something_is_chosen() -> None:
-    assert Choice.read(SETS, METHODS, {}) == Choice(SETS, METHODS, None, False)
+    assert Choice.read(SETS, SETS, METHODS, {}) == Choice(SETS, METHODS, None, False)
+    assert Choice.read(SETS, SETS[:1], METHODS, {}).sets == SETS[:1]
 
 
 def test_names_and_parts_of_names_choose() -> None:
@@ -20,7 +21,7 @@ def test_names_and_parts_of_names_choose() -> None:
         "BENCHMARK_METHODS": "gicp,default",
         "BENCHMARK_STARTS": "2",
     }
-    chosen = Choice.read(SETS, METHODS, environment)
+    chosen = Choice.read(SETS, SETS[:2], METHODS, environment)
     assert chosen.sets == ("at least half visible", "apc")
     assert chosen.methods == ("default", "small_gicp GICP")
     assert chosen.starts == 2 and chosen.is_part
@@ -37,5 +38,5 @@ def test_names_and_parts_of_names_choose() -> None:
 )
 def test_what_fits_nothing_is_named(variable: str, value: str, named: str) -> None:
     with pytest.raises(ValueError, match=variable) as caught:
-        Choice.read(SETS, METHODS, {variable: value})
+        Choice.read(SETS, SETS, METHODS, {variable: value})
     assert named in str(caught.value)
