@@ -42,6 +42,8 @@ def sign_in_page() -> FileResponse:
 @router.get("/")
 @router.get("/export")
 @router.get("/studies")
+@router.get("/objects")
+@router.get("/objects/{object_id}")
 @router.get("/label/{task_id}")
 @router.get("/replay/{registration_id}")
 @router.get("/report/{study_id}")

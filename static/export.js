@@ -3,7 +3,7 @@
 import { showAccount } from "./account.js";
 import { get, getAll, post } from "./api.js";
 import { byId, element, icon, setText } from "./dom.js";
-import { fileSize } from "./format.js";
+import { count, fileSize } from "./format.js";
 import { messageArea } from "./message.js";
 
 const POLL_MS = 500;
@@ -52,8 +52,11 @@ function chosen() {
 }
 
 function showContents() {
-  const { scenes, objects, tasks, tasks_submitted: submitted } = chosen();
+  const { id, scenes, objects, tasks, tasks_submitted: submitted, suggestions_open: open } = chosen();
   const figures = { "poses submitted": submitted, "tasks still open": tasks - submitted, scenes, objects };
+  byId("undecided").hidden = !open;
+  for (const link of document.querySelectorAll("#objects, #undecided a")) link.href = `/objects?dataset_id=${id}`;
+  setText(byId("undecided-count"), count(open, "object"));
   byId("contents").replaceChildren(
     ...Object.entries(figures).map(([name, number]) =>
       element("div", {}, element("dt", {}, name), element("dd", {}, number.toLocaleString("en"))),

@@ -21,6 +21,8 @@ LINE_WIDTH = 3.0
 """Pixels."""
 OPACITY = 0.45
 RADIANS_A_PIECE = 0.1
+LABEL_SCALE = 0.8
+"""Of the numbers of axes."""
 
 
 class UncertaintyView:
@@ -54,6 +56,8 @@ class UncertaintyView:
         if uncertainty.unknown:
             lines = [lines_of(motion, uncertainty.centre, self._diameter) for motion in uncertainty.unknown]
             self._nodes.append(self._add_lines(np.concatenate(lines)))
+        if len(uncertainty.unknown) > 1:  # or nobody could tell which is which
+            self._nodes += [self._add_number(n, line[0, 1]) for n, line in enumerate(lines, start=1)]
 
     def _add_ellipsoid(self, uncertainty: Uncertainty) -> viser.IcosphereHandle:
         lengths = np.linalg.norm(uncertainty.ellipsoid, axis=0)
@@ -70,6 +74,11 @@ class UncertaintyView:
             position=uncertainty.centre,
             cast_shadow=False,
             receive_shadow=False,
+        )
+
+    def _add_number(self, number: int, at: Array) -> viser.LabelHandle:
+        return self._scene.add_label(
+            f"/uncertainty/axis-{number}", f"axis {number}", position=at, font_screen_scale=LABEL_SCALE
         )
 
     def _add_lines(self, segments: Array) -> viser.LineSegmentsHandle:

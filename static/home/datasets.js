@@ -1,7 +1,7 @@
 /** The datasets with their progress; pressing one shows only its tasks. */
 
 import { getAll } from "../api.js";
-import { byId, element } from "../dom.js";
+import { byId, element, icon } from "../dom.js";
 import { count } from "../format.js";
 
 /** Shows all datasets and returns them. `choose(id or null)` is called when one is pressed. */
@@ -20,11 +20,12 @@ export async function showDatasets({ selected, choose, openImport }) {
     });
   }
   press(selected);
-  byId("datasets").replaceChildren(...(buttons.length ? buttons : [nothingImported(openImport)]));
+  const cards = datasets.map((dataset, index) => element("div", {}, buttons[index], objectsLink(dataset)));
+  byId("datasets").replaceChildren(...(cards.length ? cards : [nothingImported(openImport)]));
   return datasets;
 }
 
-function datasetButton({ id, name, scenes, objects, tasks, tasks_submitted: submitted }) {
+function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted }) {
   const button = element("button", { type: "button", className: "dataset", "data-dataset-id": id });
   const most = Math.max(tasks, 1);
   button.append(
@@ -35,9 +36,17 @@ function datasetButton({ id, name, scenes, objects, tasks, tasks_submitted: subm
       element("span", { className: "dataset-done" }, tasks ? `${submitted} of ${tasks}` : "no tasks"),
     ),
     element("progress", { className: "human", max: most, value: submitted, "aria-label": "Submitted" }),
-    element("small", {}, `${count(scenes, "scene")} · ${count(objects, "object")}`),
+    element("small", {}, count(scenes, "scene")),
   );
   return button;
+}
+
+/** "5 objects · 2 with suggested symmetries": leads to one that nobody has decided about, if there is one. */
+function objectsLink({ id, name, objects, suggestions_open: open }) {
+  const link = element("a", { className: "dataset-objects", href: `/objects?dataset_id=${id}` }, count(objects, "object"));
+  link.setAttribute("aria-label", `Objects of ${name}`);
+  if (open) link.append(" · ", icon("machine"), `${open} with suggested symmetries`);
+  return link;
 }
 
 function nothingImported(openImport) {

@@ -54,7 +54,7 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   function append({ items, next: cursor }) {
     next = cursor ?? null;
-    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me), replayLinks(task, me))));
+    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me), cardLinks(task, me))));
     byId("more").hidden = next === null;
     setText(byId("tasks-status"), `${count(byId("tasks").childElementCount, "task")} shown`);
   }
@@ -122,15 +122,17 @@ function sceneText({ scene, method }) {
   return method === "default" ? scene.label : `${scene.label} · ${METHODS[method].name}`;
 }
 
-/** Who submitted the task, each name leading to the replay: one's own, or everybody's for a reviewer. */
-function replayLinks({ operators }, me) {
+/** The object's page; and who submitted the task, each name leading to the replay: one's own, or all for a reviewer. */
+function cardLinks({ operators, object }, me) {
+  const page = element("a", { href: `/objects/${object.id}`, "aria-label": `Object ${object.name}` }, "Object");
   const links = operators
     .filter(({ name, state }) => state === "submitted" && (name === me.name || me.role !== "operator"))
     .map(({ name, registration_id: id }) => {
       const shown = name === me.name ? "you" : name;
       return element("a", { href: `/replay/${id}`, "aria-label": `Replay of ${shown}` }, shown);
     });
-  return links.length ? element("p", { className: "card-replays" }, icon("play"), "Replay", ...links) : null;
+  const replays = links.length ? [icon("play"), "Replay", ...links] : [];
+  return element("p", { className: "card-links" }, icon("cube"), page, ...replays);
 }
 
 /** "In progress · you, Ada", "Skipped · you (no depth)". */

@@ -169,6 +169,7 @@ function showTask() {
   setText(byId("crumb-object"), name);
   byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
   byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
+  if (!page.isTrial()) byId("crumb-object").href = `/objects/${task.object.id}`;
 }
 
 async function showDatasetProgress() {
@@ -197,7 +198,10 @@ function show(received) {
   drawPanel(registration, connected);
   for (const part of PARTS) part.draw?.(registration, before);
   reportSnap(before?.snap, registration.snap);
-  const { message: problem } = registration;
+  const { message: problem, symmetries_version: version } = registration;
+  if (before && version !== before.symmetries_version && !page.isTrial()) {
+    message.show("The object's symmetries were changed: the next snap goes by the new ones.");
+  }
   if (problem && problem !== before?.message) message.show(problem, "problem");
   if (before && registration.state !== before.state && !page.isTrial()) showDatasetProgress().catch(message.problem);
 }

@@ -21,6 +21,7 @@ export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
   if (!drawOn) return null;
   const { middle, radius } = sphereAround(mesh.vertices);
   let rotation = null; // of the object in the view's axes, 3x3
+  let motion = null; // the pose that the object is drawn at in its own frame; null: where it rests
   let zoom = 1;
   let grip = null;
   let turned = false;
@@ -68,12 +69,25 @@ export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
     draw();
   }
 
+  /** Draws the object moved in its own frame, without turning the view; null puts it back to rest. */
+  function move(T) {
+    motion = T;
+    draw();
+  }
+
+  /** What it takes to draw the object at rest over the same view. */
+  function resting() {
+    const unit = Math.min(devicePixelRatio, 2);
+    return { camera: cameraFor(unit), T: poseInView(), unit };
+  }
+
   function draw() {
     const unit = Math.min(devicePixelRatio, 2);
     canvas.width = Math.round(canvas.clientWidth * unit);
     canvas.height = Math.round(canvas.clientHeight * unit);
     const color = rgb(getComputedStyle(canvas).color);
-    drawOn(canvas, { camera: cameraFor(unit), T: poseInView(), color, blend: 1, unit });
+    const T = motion ? product(poseInView(), motion) : poseInView();
+    drawOn(canvas, { camera: cameraFor(unit), T, color, blend: 1, unit });
     onTurn();
   }
 
@@ -92,30 +106,39 @@ export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
   function pointUnder({ clientX, clientY }) {
     const box = canvas.getBoundingClientRect();
     const { fx, fy, cx, cy } = cameraFor(1);
-    const inView = [(clientX - box.left - 0.5 - cx) / fx, (clientY - box.top - 0.5 - cy) / fy, 1];
-    const { origin, towards } = rayFrom(inView);
+    const pointed = [(clientX - box.left - 0.5 - cx) / fx, (clientY - box.top - 0.5 - cy) / fy, 1];
+    const { origin, towards } = rayFrom(pointed);
     const far = firstHit(mesh, origin, towards);
     return far === null ? null : along(origin, towards, far);
   }
 
   /** A ray of the view's axes in the object's frame. */
-  function rayFrom(inView) {
+  function rayFrom(direction) {
     const inObject = (vector) => [0, 1, 2].map((k) => vector.reduce((sum, value, i) => sum + rotation[i][k] * value, 0));
     const toEye = inObject([0, 0, -DISTANCE * radius]);
-    return { origin: middle.map((value, k) => value + toEye[k]), towards: inObject(inView) };
+    return { origin: middle.map((value, k) => value + toEye[k]), towards: inObject(direction) };
   }
 
   /** Where in the canvas a point of the object is [page pixels], and whether the object hides it. */
   function placeOf(point) {
-    const { fx, fy, cx, cy } = cameraFor(1);
-    const [x, y, z] = poseInView().slice(0, 3).map((row) => dot(row, point) + row[3]);
+    const [x, y, z] = inView(point);
     const { origin, towards } = rayFrom([x / z, y / z, 1]);
     const surface = firstHit(mesh, origin, towards) ?? z; // in steps of depth, since the ray's is 1
-    const isHidden = surface < z - HIDDEN * radius;
-    return { x: (fx * x) / z + cx + 0.5, y: (fy * y) / z + cy + 0.5, isHidden };
+    return { ...projected(point), isHidden: surface < z - HIDDEN * radius };
   }
 
-  return { look, placeOf };
+  /** The same place, without asking whether something hides it. */
+  function projected(point) {
+    const { fx, fy, cx, cy } = cameraFor(1);
+    const [x, y, z] = inView(point);
+    return { x: (fx * x) / z + cx + 0.5, y: (fy * y) / z + cy + 0.5 };
+  }
+
+  function inView(point) {
+    return poseInView().slice(0, 3).map((row) => dot(row, point) + row[3]);
+  }
+
+  return { look, turn, move, resting, placeOf, projected, middle, radius };
 }
 
 const dot = (row, point) => row[0] * point[0] + row[1] * point[1] + row[2] * point[2];

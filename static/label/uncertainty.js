@@ -28,7 +28,7 @@ export function uncertaintyPart(page) {
     if (wanted !== snapId || uncertainty.snap_id !== snapId) return;
     const { translation, rotation, unknown } = uncertainty;
     setText(byId("uncertainty-size"), `± ${millimetres(translation)}, ± ${degrees(rotation)}`);
-    byId("unknown-motions").replaceChildren(...unknown.map((motion) => element("li", {}, sentence(motion))));
+    byId("unknown-motions").replaceChildren(...unknown.map((motion, index) => element("li", {}, sentence(motion, axisName(unknown, index)))));
     byId("uncertainty").hidden = false;
   }
 
@@ -59,16 +59,19 @@ export function uncertaintyPart(page) {
   return { title: "The machine", bindings, attach, draw };
 }
 
-function sentence({ kind, motion, extent }) {
+/** Several axes have their numbers in the 3-D view. */
+const axisName = (unknown, index) => (unknown.length > 1 ? `the blue axis ${index + 1}` : "the blue axis");
+
+function sentence({ kind, motion, extent }, axis) {
   const isTurn = motion === "turn";
   if (kind === "other mode") {
     return isTurn
-      ? `Turned by ${degrees(extent)} about the blue axis it fits as well.`
-      : `Shifted by ${millimetres(extent)} along the blue axis it fits as well.`;
+      ? `Turned by ${degrees(extent)} about ${axis} it fits as well.`
+      : `Shifted by ${millimetres(extent)} along ${axis} it fits as well.`;
   }
-  if (!isTurn) return `Depth does not tell where along the blue axis it lies: ± ${millimetres(extent)}.`;
-  if (extent * DEGREES >= ANY_TURN) return "Depth does not tell the turn about the blue axis at all.";
-  return `Depth does not tell the turn about the blue axis: ± ${degrees(extent)}.`;
+  if (!isTurn) return `Depth does not tell where along ${axis} it lies: ± ${millimetres(extent)}.`;
+  if (extent * DEGREES >= ANY_TURN) return `Depth does not tell the turn about ${axis} at all.`;
+  return `Depth does not tell the turn about ${axis}: ± ${degrees(extent)}.`;
 }
 
 const millimetres = (metres) => `${digits(metres * 1000)} mm`;

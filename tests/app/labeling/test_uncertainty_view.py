@@ -80,3 +80,14 @@ def test_it_can_be_hidden_without_being_forgotten(view):
             lambda message: message["name"] == "/uncertainty" and not message["visible"],
         )
     assert not view.uncertainty.visible
+
+
+def test_several_axes_are_numbered_where_they_end(view):
+    turn, shift = (UnknownMotion("free motion", motion, AXIS, 0.05) for motion in ("turn", "shift"))
+    view.uncertainty.show(unsure([0.0005] * 3, turn, shift))
+    with connect(view) as client:
+        for number in (1, 2):
+            label = client.node("LabelMessage", f"/uncertainty/axis-{number}")
+            assert label["props"]["text"] == f"axis {number}"
+        view.uncertainty.show(unsure([0.0005] * 3, turn))
+        client.wait_for("RemoveSceneNodeMessage", lambda message: message["name"] == "/uncertainty/axis-1")
