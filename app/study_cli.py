@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,13 +12,17 @@ from app.terminal import checked_database, console, fail, progress_bar, read_set
 if TYPE_CHECKING:
     from app.config import Settings
     from app.database import Database
+    from app.study.offline import Plan
+    from app.study.sampling import Sampling
     from app.study.studies import Studies
     from app.study.workplace import Workplace
-    from app.tables import Study
+    from app.tables import Method, Study
 
 study_cli = typer.Typer(no_args_is_help=True, help="Studies of how people register objects.")
 
 Part = Annotated[str | None, typer.Option(help="Only trials of this one.")]
+TOLD_FROM_SECONDS = 120.0
+"""That a batch will take: from there on it says so before it begins."""
 StudyName = Annotated[str, typer.Argument(metavar="STUDY", help="Name of the study.")]
 
 
@@ -76,8 +80,27 @@ def simulate_study(
 
 
 @study_cli.command("snap")
-def snap_study(name: StudyName) -> None:
+def snap_study(
+    name: StudyName,
+    method: Annotated[
+        Literal["default", "paper"],
+        typer.Option(help="What the snaps are computed with; paper: the particle filter."),
+    ] = "default",
+    every: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Least seconds between two snapped poses; 2 with paper, else 0."),
+    ] = None,
+    moved_mm: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Least movement between them, unless turned; 5 with paper, else 0."),
+    ] = None,
+    moved_deg: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Least turn between them, unless moved; 5 with paper, else 0."),
+    ] = None,
+) -> None:
     """Compute a snap from every pose that the operators of STUDY passed through, as far as it is missing."""
+    sampling = _sampling(method, every, moved_mm, moved_deg)
     settings = read_settings()
     database = checked_database(settings)
     study = _existing(database, name)
@@ -87,16 +110,50 @@ def snap_study(name: StudyName) -> None:
         from app.study.snap_store import SnapStore
 
         registrations = registrations_of(database, study.id)
-        batch = OfflineBatch(database, workplace.data, workplace.snapper)
+        batch = OfflineBatch(database, workplace.data, workplace.snapper, method, sampling)
         with _told("snapping") as on_progress:
-            summary = batch.run(registrations, on_progress)
-        seconds = SnapStore(database).median_seconds(registrations)
+            summary = batch.run(registrations, on_progress, lambda plan: _print_plan(plan, sampling))
+        seconds = SnapStore(database).median_seconds(registrations, method)
     took = f" A snap took {seconds:.2g} s (median)." if summary.samples else ""
     console.print(
         f"Study {name}: {summary.samples} sampled poses, {summary.computed} snaps computed,"
         f" {summary.failed} failed.{took}",
         markup=False,
     )
+
+
+def _sampling(
+    method: "Method", every: float | None, moved_mm: float | None, moved_deg: float | None
+) -> "Sampling":
+    """What suits the method, with what was asked for in its place."""
+    from dataclasses import replace
+    from math import radians
+
+    from app.study.sampling import SAMPLINGS
+
+    given = {
+        "seconds": every,
+        "translation": None if moved_mm is None else moved_mm / 1000,
+        "rotation": None if moved_deg is None else radians(moved_deg),
+    }
+    return replace(SAMPLINGS[method], **{name: value for name, value in given.items() if value is not None})
+
+
+def _print_plan(plan: "Plan", sampling: "Sampling") -> None:
+    if plan.chosen < plan.sampled:
+        console.print(f"{plan.chosen} of {plan.sampled} sampled poses are chosen, {sampling}.", markup=False)
+    if plan.seconds >= TOLD_FROM_SECONDS:
+        console.print(
+            f"{plan.snaps} snaps are to be computed, which will take about {_duration(plan.seconds)}. It may"
+            f" be stopped at any time; the same command goes on.",
+            markup=False,
+        )
+
+
+def _duration(seconds: float) -> str:
+    """Roughly, in words."""
+    minutes = round(seconds / 60)
+    return f"{minutes} minutes" if minutes < 120 else f"{seconds / 3600:.1f} hours"
 
 
 @study_cli.command("report")
@@ -109,6 +166,7 @@ def report_study(
     scene: Part = None,
     object: Part = None,
     snap_seconds: Annotated[float, typer.Option(min=0.0, help="That each snap is charged with.")] = 0.1,
+    paper_seconds: Annotated[float, typer.Option(min=0.0, help="The same, by the paper's filter.")] = 7.0,
     without_idle: Annotated[bool, typer.Option("--without-idle", help="Leave idle time out.")] = False,
     reference: Annotated[
         bool,
@@ -116,12 +174,14 @@ def report_study(
     ] = False,
 ) -> None:
     """Write the report of STUDY, or of a part of it: figure, tables, and a page that opens anywhere."""
+    from app.analysis.collect import TruthSource
     from app.analysis.report import ReportConfig, study_report, write_report
     from app.analysis.selection import Selection
 
     database = checked_database(read_settings())
     study = _existing(database, name)
-    config = ReportConfig(snap_seconds, without_idle, truth="reference" if reference else "operators")
+    truth: TruthSource = "reference" if reference else "operators"
+    config = ReportConfig(snap_seconds, without_idle, truth, paper_seconds=paper_seconds)
     part = Selection(group, mode, condition, scene, object)
     with progress_bar() as progress:
         progress.add_task("reading the log", total=None)

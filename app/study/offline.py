@@ -6,7 +6,7 @@ and the rest comes out the same, for a snap's seed depends on its input alone.
 
 import uuid
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -17,15 +17,20 @@ import numpy as np
 
 from app import __version__
 from app.database import Database
+from app.methods import config_of
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
 from app.study.samples import Sample, samples_of
+from app.study.sampling import SAMPLINGS, Sampling
 from app.study.snap_batch import BatchResult, BatchStart, SnapBatch
 from app.study.snap_store import Outcome, SnapStore
-from registration_core import ALGORITHM, SnapConfig, pose
+from app.tables import Method
+from registration_core import ALGORITHM, pose
 
-SNAPS_AT_ONCE = 16
-"""In one job of a worker, which takes about a second then."""
+SNAPS_AT_ONCE: Mapping[Method, int] = {"default": 16, "paper": 1}
+"""In one job of a worker, so that it takes a second, or a whole filter."""
+SECONDS: Mapping[Method, float] = {"default": 0.05, "paper": 12.0}
+"""That one core needs for a snap, roughly, until there are some that were measured."""
 JOBS_A_WORKER = 2
 """That are under way or wait at a worker, so that it never has to."""
 PRIORITY = -2
@@ -43,11 +48,25 @@ class OfflineError(Exception):
 
 
 @dataclass(frozen=True)
+class Plan:
+    """What a batch is about to do."""
+
+    sampled: int
+    """Poses of the traces, in all."""
+    chosen: int
+    """Of these, the ones that are snapped."""
+    snaps: int
+    """Still to be computed, each for all samples of its input."""
+    seconds: float
+    """That they will take, roughly."""
+
+
+@dataclass(frozen=True)
 class Summary:
     """What a batch did."""
 
     samples: int
-    """In all."""
+    """That were chosen, in all."""
     computed: int
     """Snaps, each for all samples of its input."""
     failed: int
@@ -61,30 +80,44 @@ class OfflineBatch:
         database: With their logs.
         data: With their images and objects.
         snapper: Whose workers compute.
-        config: Of the snaps.
+        method: Of the snaps.
+        sampling: Which poses are snapped; where it is None, those that suit the method.
     """
 
     def __init__(
-        self, database: Database, data: SceneData, snapper: Snapper, config: SnapConfig | None = None
+        self,
+        database: Database,
+        data: SceneData,
+        snapper: Snapper,
+        method: Method = "default",
+        sampling: Sampling | None = None,
     ) -> None:
         self._database = database
         self._store = SnapStore(database)
         self._data = data
         self._snapper = snapper
-        self._config = config or SnapConfig()
+        self._method = method
+        self._config = config_of(method)
+        self.sampling = sampling or SAMPLINGS[method]
 
-    def run(self, registration_ids: Sequence[int], on_progress: Callable[[int, int], None]) -> Summary:
+    def run(
+        self,
+        registration_ids: Sequence[int],
+        on_progress: Callable[[int, int], None],
+        on_plan: Callable[[Plan], None] = lambda plan: None,
+    ) -> Summary:
         """Compute and store what is missing.
 
         Args:
             registration_ids: Whose samples; they must not change meanwhile.
             on_progress: Told how many samples have their snap, and of how many.
+            on_plan: Told once what there is to do, before it begins.
 
         Raises:
             OfflineError: where the workers cannot be reached, one of them died, or one computes otherwise.
             StoreError: where another batch does the same.
         """
-        total, missing = self._missing(registration_ids)
+        sampled, total, missing = self._missing(registration_ids)
         known = self._store.outcomes([samples[0].input_hash for samples in missing])
         unknown = [samples for samples in missing if samples[0].input_hash not in known]
         copies = [
@@ -93,30 +126,44 @@ class OfflineBatch:
         if copies:
             self._store.add(copies)
         done = total - sum(map(len, unknown))
+        on_plan(Plan(sampled, total, len(unknown), self._duration(registration_ids, len(unknown))))
         on_progress(done, total)
         with closing(self._computed(unknown)) as results:
             for inputs, result in results:
                 self._store.add(self._snaps(inputs, result))
                 done += sum(map(len, inputs))
                 on_progress(done, total)
-        return Summary(total, len(unknown), self._store.failures(registration_ids))
+        return Summary(total, len(unknown), self._store.failures(registration_ids, self._method))
 
-    def _missing(self, registration_ids: Sequence[int]) -> tuple[int, list[Input]]:
-        """How many samples there are, and those without their snap, by input; those of a view together."""
+    def _duration(self, registration_ids: Sequence[int], snaps: int) -> float:
+        """Seconds that so many snaps will take, by those that there are, or else by what is usual."""
+        if not snaps:
+            return 0.0
+        self._snapper.wait_until_ready()
+        measured = self._store.median_seconds(registration_ids, self._method)
+        each = measured if np.isfinite(measured) else SECONDS[self._method]
+        return snaps * each / max(1, self._snapper.worker_count())
+
+    def _missing(self, registration_ids: Sequence[int]) -> tuple[int, int, list[Input]]:
+        """How many samples there are and how many are chosen, and of these the ones without their snap, by
+        input; those of a view together.
+        """
         inputs: dict[str, list[Sample]] = defaultdict(list)
-        total = 0
+        sampled = total = 0
         for registration_id in registration_ids:
             stored = self._store.stored(registration_id)
-            for sample in samples_of(self._database, registration_id, self._config):
-                total += 1
+            samples = list(samples_of(self._database, registration_id, self._config))
+            chosen = self.sampling.of(samples)
+            sampled, total = sampled + len(samples), total + len(chosen)
+            for sample in chosen:
                 if (sample.seconds, sample.input_hash) not in stored:
                     inputs[sample.input_hash].append(sample)
-        return total, sorted(inputs.values(), key=_view_of)
+        return sampled, total, sorted(inputs.values(), key=_view_of)
 
     def _computed(self, inputs: Sequence[Input]) -> Generator[tuple[Sequence[Input], BatchResult]]:
         """Results as they come; whatever ends this takes what is under way back from the workers."""
         self._snapper.wait_until_ready()
-        batches, ended = _batches(inputs), SimpleQueue[Ended]()
+        batches, ended = _batches(inputs, SNAPS_AT_ONCE[self._method]), SimpleQueue[Ended]()
         under_way: dict[str, Callable[[], None]] = {}
 
         def hand_over(most: int) -> None:
@@ -163,6 +210,7 @@ class OfflineBatch:
             found = outcome.T_camera_object
             columns = {
                 "config": self._config.to_dict(),
+                "method": self._method,
                 "seed": samples[0].seed,
                 "T_world_object": None if found is None else (T_world_camera @ found).tolist(),
                 "confidence": outcome.confidence,
@@ -181,9 +229,9 @@ def _view_of(samples: Input) -> tuple[int, int]:
     return samples[0].view.key
 
 
-def _batches(inputs: Sequence[Input]) -> Iterator[list[Input]]:
+def _batches(inputs: Sequence[Input], most: int) -> Iterator[list[Input]]:
     for _, of_view in groupby(inputs, key=_view_of):
-        while batch := list(islice(of_view, SNAPS_AT_ONCE)):
+        while batch := list(islice(of_view, most)):
             yield batch
 
 

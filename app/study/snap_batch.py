@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.worker import Job, Tell, hardware
-from registration_core import ALGORITHM, ObjectModel, snap
+from registration_core import ALGORITHM, ObjectModel, snap_steps
 
 Array = NDArray[np.float64]
 
@@ -52,18 +52,20 @@ class SnapBatch(Job[BatchResult]):
 
     def run(self, model: ObjectModel, tell: Tell) -> BatchResult:
         """One after the other; one that fails leaves the others as they are."""
-        outcomes = []
-        for number, start in enumerate(self.starts):
-            tell(number / len(self.starts))
-            outcomes.append(self._outcome(model, start))
-        return BatchResult(tuple(outcomes), ALGORITHM, hardware())
+        outcomes = tuple(self._outcome(model, number, tell) for number in range(len(self.starts)))
+        return BatchResult(outcomes, ALGORITHM, hardware())
 
-    def _outcome(self, model: ObjectModel, start: BatchStart) -> BatchOutcome:
+    def _outcome(self, model: ObjectModel, number: int, tell: Tell) -> BatchOutcome:
+        start = self.starts[number]
         began, rng = time.perf_counter(), np.random.default_rng(start.seed)
+        estimate = None
         try:
-            estimate = snap(model, self.depth, self.camera, start.T_camera_object, self.config, rng)
+            for step in snap_steps(model, self.depth, self.camera, start.T_camera_object, self.config, rng):
+                tell((number + step.iteration / step.iterations) / len(self.starts))
+                estimate = step.estimate
         except ValueError as error:
             return BatchOutcome(None, None, time.perf_counter() - began, 0, f"{error}")
+        assert estimate is not None
         return BatchOutcome(
             estimate.T_camera_object, estimate.confidence, estimate.seconds, estimate.evaluations
         )

@@ -9,7 +9,7 @@ from sqlalchemy.exc import IntegrityError
 
 from app.database import Database
 from app.study.samples import Sample
-from app.tables import OfflineSnap
+from app.tables import Method, OfflineSnap
 
 HASHES_AT_ONCE = 500
 
@@ -17,6 +17,7 @@ Outcome = Mapping[str, Any]
 """Columns that are the same for all samples of one input, by name: `OUTCOME`."""
 OUTCOME = (
     "config",
+    "method",
     "seed",
     "T_world_object",
     "confidence",
@@ -80,16 +81,22 @@ class SnapStore:
                 "Another batch stores the offline snaps of the same registrations. Let one of them end first."
             ) from error
 
-    def median_seconds(self, registration_ids: Sequence[int]) -> float:
+    def median_seconds(self, registration_ids: Sequence[int], method: Method = "default") -> float:
         """What the snaps of registrations took, each counting once, as measured; NaN where there are none."""
         query = select(OfflineSnap.input_hash, OfflineSnap.snap_seconds)
         with self._database.read() as session:
-            rows = session.execute(query.where(OfflineSnap.registration_id.in_(registration_ids)))
+            rows = session.execute(
+                query.where(OfflineSnap.registration_id.in_(registration_ids), OfflineSnap.method == method)
+            )
             seconds = {row.input_hash: row.snap_seconds for row in rows}
         return float(np.median(list(seconds.values()))) if seconds else np.nan
 
-    def failures(self, registration_ids: Sequence[int]) -> int:
+    def failures(self, registration_ids: Sequence[int], method: Method) -> int:
         """How many samples of registrations have a snap that failed."""
-        failed = (OfflineSnap.registration_id.in_(registration_ids), OfflineSnap.message != "")
+        failed = (
+            OfflineSnap.registration_id.in_(registration_ids),
+            OfflineSnap.method == method,
+            OfflineSnap.message != "",
+        )
         with self._database.read() as session:
             return session.scalar(select(func.count()).select_from(OfflineSnap).where(*failed)) or 0

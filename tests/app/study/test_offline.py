@@ -16,10 +16,12 @@ from app.services import Services
 from app.snapping import SnapError
 from app.study.offline import OfflineBatch, OfflineError, Summary
 from app.study.samples import samples_of
+from app.study.sampling import Sampling
 from app.study.simulated_operator import SimulatedClock
 from app.study.snap_store import SnapStore, StoreError
 from app.tables import OfflineSnap, utc_now
 from registration_core import ALGORITHM, SnapConfig, pose, snap
+from registration_core.snap_config import ParticleFilterConfig
 from tests.app.small_dataset import TOOL, true_pose
 
 STEPS = (0.06, 0.03, 0.015, 0.0)
@@ -208,3 +210,33 @@ def test_two_batches_at_once_are_said(made):
 
     with pytest.raises(StoreError, match="Another batch"):
         made.batch.run([registration_id], interfere)
+
+
+def test_the_papers_filter_has_snaps_of_its_own_from_fewer_poses(made, monkeypatch):
+    short = replace(SnapConfig.paper(), particle_filter=ParticleFilterConfig(particles=40, iterations=20))
+    monkeypatch.setattr("app.study.offline.config_of", lambda method: short)
+    registration_id = made.register("ann", *map(beside, STEPS))
+    services, plans = made.services, []
+    batch = OfflineBatch(services.database, services.data, services.snapper, "paper", Sampling(2.0, 0.02))
+    summary = batch.run([registration_id], lambda done, total: None, plans.append)
+    assert summary == Summary(samples=4, computed=3, failed=0)
+    assert (plans[0].sampled, plans[0].chosen, plans[0].snaps) == (17, 4, 3) and plans[0].seconds > 0
+    rows = made.rows(registration_id)
+    assert [row.seconds for row in rows] == pytest.approx([0.0, 2.0, 6.0, 8.0])
+    assert {(row.method, row.config["method"]) for row in rows} == {("paper", "particle_filter")}
+    again = batch.run([registration_id], lambda done, total: None, plans.append)
+    assert again == Summary(samples=4, computed=0, failed=0) and plans[1].seconds == 0.0
+    monkeypatch.undo()
+    assert made.run(registration_id) == Summary(samples=17, computed=4, failed=0)
+    assert [row.method for row in made.rows(registration_id)].count("default") == 17
+
+
+def test_a_longer_batch_says_so_by_what_was_measured(made):
+    registration_id = made.register("ann", beside(0.02))
+    made.run(registration_id)
+    median = SnapStore(made.services.database).median_seconds([registration_id])
+    other = made.register("bob", beside(0.04))
+    plans = []
+    made.batch.run([registration_id, other], lambda done, total: None, plans.append)
+    workers = made.services.snapper.worker_count()
+    assert plans[0].seconds == pytest.approx(median / workers)
