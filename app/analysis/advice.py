@@ -78,7 +78,7 @@ def _dragged_on(work: Sequence[Work], translation: float, rotation: float) -> fl
         is_near = (trial.errors.translation <= translation) & (trial.errors.rotation <= rotation)
         came, reached = (
             float(first_within(trial.active_seconds, np.where(is_so, 0.0, np.nan), np.zeros(1))[0])
-            for is_so in (np.isfinite(trial.stg_errors.translation), is_near)
+            for is_so in (np.isfinite(trial.stg_of_kind("translation")), is_near)
         )
         if np.isfinite(came):
             waits.append(max(0.0, came - reached))

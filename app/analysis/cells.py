@@ -1,6 +1,6 @@
 """The curves of each group, mode, condition and error, with all that is read off them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from app.analysis.curves import MARGINS, Curve, Timing, curve_of, human_times, stg_times
 from app.analysis.fitts import Fitts, fitts
 from app.analysis.hand_off import HandOff, hand_off
-from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
+from app.analysis.trial import ERROR_KINDS, METHODS, ErrorKind, TrialTrace
+from app.tables import Method
 
 Array = NDArray[np.float64]
 Unit = Callable[[TrialTrace], str]
@@ -28,6 +29,13 @@ class Drawn:
 
 
 @dataclass(frozen=True, eq=False)
+class StgCurve(Drawn):
+    """The curve of snaps by one method."""
+
+    hand_off: HandOff | None
+
+
+@dataclass(frozen=True, eq=False)
 class Cell:
     """What operators of one group did in one mode under one condition, judged by one error."""
 
@@ -39,9 +47,18 @@ class Cell:
     trials: int
     human: Drawn
     """As it was done; by hand alone where the condition is manual."""
-    stg: Drawn | None
-    """None where no snap was computed."""
-    hand_off: HandOff | None
+    stg: Mapping[Method, StgCurve]
+    """By the methods by which any snap was computed."""
+
+    @property
+    def curves(self) -> Iterator[tuple[Method | None, Drawn]]:
+        """The human's, which has no method, and then those of the snaps."""
+        yield None, self.human
+        yield from self.stg.items()
+
+
+CURVE_NAMES: Mapping[Method | None, str] = {None: "human", "default": "STG", "paper": "STG, paper's filter"}
+"""As people read them."""
 
 
 def operator_of(trial: TrialTrace) -> str:
@@ -69,7 +86,11 @@ def _cell(
 ) -> Cell:
     units = [unit(trial) for trial in trials]
     human = human_times(trials, kind, timing)
-    stg = stg_times(trials, kind, timing) if any(trial.has_stg for trial in trials) else None
+    stg = {
+        method: stg_times(trials, kind, timing, method)
+        for method in METHODS
+        if any(trial.has_stg(method) for trial in trials)
+    }
     group, mode, condition = key_of(trials[0])
     return Cell(
         group=group,
@@ -78,9 +99,14 @@ def _cell(
         error=kind,
         operators=len({trial.operator for trial in trials}),
         trials=len(trials),
-        human=_drawn(human, trials, units, kind, distance, seed),
-        stg=None if stg is None else _drawn(stg, trials, units, kind, distance, seed),
-        hand_off=None if stg is None else hand_off(human, stg, units, MARGINS[kind], seed),
+        human=Drawn(*_drawn(human, trials, units, kind, distance, seed)),
+        stg={
+            method: StgCurve(
+                *_drawn(times, trials, units, kind, distance, seed),
+                hand_off=hand_off(human, times, units, MARGINS[kind], seed),
+            )
+            for method, times in stg.items()
+        },
     )
 
 
@@ -91,10 +117,10 @@ def _drawn(
     kind: ErrorKind,
     distance: float,
     seed: int,
-) -> Drawn:
+) -> tuple[Curve, tuple[int | None, ...], Fitts | None]:
     curve = curve_of(times, units, MARGINS[kind], seed)
     ids = tuple(None if i < 0 else trials[i].registration_id for i in curve.typical.tolist())
-    return Drawn(curve, ids, fitts(curve, distance, seed))
+    return curve, ids, fitts(curve, distance, seed)
 
 
 def _distance(trials: Sequence[TrialTrace], kind: ErrorKind) -> float:

@@ -12,14 +12,14 @@ from sqlalchemy import select
 from app.analysis.ground_truth import GroundTruth, given_truth, mean_truth
 from app.analysis.log_faults import faults_of
 from app.analysis.logs import LoggedRow, read_logs
-from app.analysis.offline_snaps import SnapsBySecond, about_snaps, snaps_at, snaps_of
+from app.analysis.offline_snaps import SnapsAt, SnapsBySecond, StudySnaps, about_snaps, snaps_at, snaps_of
 from app.analysis.pose_errors import PoseErrors, pose_errors
 from app.analysis.remarks import Remark, counted
 from app.analysis.runs import Place, Run, about_participants, place_name, runs_of, symmetries_of
 from app.analysis.trace import trace_of, until_submission
-from app.analysis.trial import TrialTrace, traced, without_snaps
+from app.analysis.trial import Snapped, TrialTrace, traced, without_snaps
 from app.database import Database
-from app.tables import Participant, Pose, Study
+from app.tables import Method, Participant, Pose, Study
 
 Array = NDArray[np.float64]
 TruthSource = Literal["operators", "reference"]
@@ -47,7 +47,8 @@ class Collected:
     trials: Sequence[TrialTrace]
     truths: Sequence[PlaceTruth]
     algorithm: str | None
-    """That computed the offline snaps; None where there are none, or an older version did not say."""
+    """That computed the offline snaps, those by the default where there are any; None where there are none,
+    or an older version did not say."""
     remarks: Sequence[Remark]
 
 
@@ -74,8 +75,8 @@ def trials_of(database: Database, study_id: int, source: TruthSource = "operator
         snaps = snaps_of(session, study_id)
     remarks = [*about_participants(study, participants), *remarks]
     truths = _truths(runs, source, remarks)
-    trials = _trials(database, runs, truths, snaps.by_registration, remarks)
-    remarks += about_snaps(trials, snaps.algorithm)
+    trials = _trials(database, runs, truths, snaps, remarks)
+    remarks += about_snaps(trials, snaps)
     present = [participant.group for participant in participants if participant.withdrawn_at is None]
     return Collected(
         study_id=study_id,
@@ -86,7 +87,7 @@ def trials_of(database: Database, study_id: int, source: TruthSource = "operator
         },
         trials=trials,
         truths=list(truths.values()),
-        algorithm=snaps.algorithm,
+        algorithm=next((of_method.algorithm for of_method in snaps.values()), None),
         remarks=remarks,
     )
 
@@ -144,7 +145,7 @@ def _trials(
     database: Database,
     runs: Sequence[Run],
     truths: Mapping[Place, PlaceTruth],
-    snaps: Mapping[int, SnapsBySecond],
+    snaps: Mapping[Method, StudySnaps],
     remarks: list[Remark],
 ) -> list[TrialTrace]:
     counting = {run.registration.id: run for run in runs if run.place in truths}
@@ -161,7 +162,12 @@ def _trials(
         if not any(fault.spoils_times for fault in faults):
             T_truth = truths[run.place].truth.T_world_object
             of_object = symmetries[run.task.object_id]
-            trials.append(_trial(run, rows, T_truth, of_object, snaps.get(registration_id, {})))
+            of_run = {
+                method: of_method.by_registration[registration_id]
+                for method, of_method in snaps.items()
+                if registration_id in of_method.by_registration
+            }
+            trials.append(_trial(run, rows, T_truth, of_object, of_run))
     remarks += [
         Remark(run.about, "has no log; left out", run.registration.id) for run in logs_missing.values()
     ]
@@ -169,15 +175,26 @@ def _trials(
 
 
 def _trial(
-    run: Run, rows: Sequence[LoggedRow], T_truth: Array, symmetries: Array, snaps: SnapsBySecond
+    run: Run,
+    rows: Sequence[LoggedRow],
+    T_truth: Array,
+    symmetries: Array,
+    snaps: Mapping[Method, SnapsBySecond],
 ) -> TrialTrace:
     trace = trace_of(run.task.T_world_object_start, until_submission(rows))
     times = trace.sample_times()
     errors = pose_errors(trace.motion.at(times), T_truth, symmetries)
-    found = snaps_at(times, snaps)
-    stg_errors = without_snaps(len(times))
+    stg = {
+        method: _snapped(snaps_at(times, by_second), T_truth, symmetries)
+        for method, by_second in snaps.items()
+    }
+    return traced(run.info, trace, times, errors, stg)
+
+
+def _snapped(found: SnapsAt, T_truth: Array, symmetries: Array) -> Snapped:
+    errors = without_snaps(len(found.computed))
     if found.places:
-        stg = pose_errors(found.T_world_object, T_truth, symmetries)
-        stg_errors.translation[found.places] = stg.translation
-        stg_errors.rotation[found.places] = stg.rotation
-    return traced(run.info, trace, times, errors, stg_errors, found.missing)
+        known = pose_errors(found.T_world_object, T_truth, symmetries)
+        errors.translation[found.places] = known.translation
+        errors.rotation[found.places] = known.rotation
+    return Snapped(errors, found.computed)

@@ -2,12 +2,13 @@
 
 Error margin from large to small, seconds on the left axis, share of trials that come within it on the right
 one, as a faint shade with a dotted edge; a column a group, a row an error with one scale of seconds. Red and
-solid is the human, blue and dashed is STG; accurate is thick, quick is thin with marks.
+solid is the human, blue and dashed is STG, ochre and dash-dotted is STG by the paper's filter; accurate is
+thick, quick is thin with marks.
 """
 
 import io
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -19,15 +20,21 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from app.analysis.cells import Cell, Drawn
+from app.analysis.cells import CURVE_NAMES, Cell, Drawn
 from app.analysis.report import Report
 from app.analysis.trial import ERROR_KINDS, ErrorKind
 from app.analysis.units import UNITS, in_people_units
+from app.tables import Method
 
 FigureFormat = Literal["svg", "pdf"]
 
-HUMAN, STG = "#b4231a", "#0b62a8"
-Style = Literal["-", "--"]
+Style = Literal["-", "--", "-."]
+LOOKS: Mapping[Method | None, tuple[str, Style]] = {
+    None: ("#b4231a", "-"),
+    "default": ("#0b62a8", "--"),
+    "paper": ("#a87400", "-."),
+}
+"""Colour and line of each curve."""
 PANEL = (4.2, 3.1)
 """Inches."""
 SETTINGS: dict[Any, Any] = {
@@ -107,9 +114,8 @@ def _draw_panel(panel: Axes, cells: Sequence[Cell], kind: ErrorKind, title: str)
     panel.set_zorder(shares.get_zorder() + 1)
     panel.patch.set_visible(False)
     for cell in cells:
-        _draw_curve(panel, shares, cell.human, cell, HUMAN, "-")
-        if cell.stg is not None:
-            _draw_curve(panel, shares, cell.stg, cell, STG, "--")
+        for method, drawn in cell.curves:
+            _draw_curve(panel, shares, drawn, cell, *LOOKS[method])
     panel.set_xscale("log")
     panel.set_xlim(TICKS[kind][0], TICKS[kind][-1])
     panel.set_xticks(TICKS[kind])
@@ -145,10 +151,9 @@ def _draw_curve(panel: Axes, shares: Axes, drawn: Drawn, cell: Cell, color: str,
 
 
 def _legend(cells: Sequence[Cell]) -> Iterator[Line2D | Patch]:
-    hands: list[tuple[str, str, Style]] = [("human", HUMAN, "-")]
-    if any(cell.stg for cell in cells):
-        hands.append(("STG", STG, "--"))
-    for hand, color, style in hands:
+    drawn = {method for cell in cells for method, _ in cell.curves} | {None}
+    for method in (method for method in LOOKS if method in drawn):
+        color, style = LOOKS[method]
         for mode in dict.fromkeys(cell.mode for cell in cells):
             is_quick = mode == "quick"
             yield Line2D(
@@ -159,7 +164,7 @@ def _legend(cells: Sequence[Cell]) -> Iterator[Line2D | Patch]:
                 linewidth=1.2 if is_quick else 2.0,
                 marker="o" if is_quick else None,
                 markersize=3,
-                label=f"{hand}, {mode}",
+                label=f"{CURVE_NAMES[method]}, {mode}",
             )
     yield Patch(color="#777777", alpha=0.3, label="95 % interval over operators")
     yield Line2D([], [], color="#777777", linestyle=":", linewidth=1.6, label="share remaining (right axis)")

@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from app.analysis.bootstrap import Interval, interval
 from app.analysis.remarks import counted
-from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
+from app.analysis.trial import ERROR_KINDS, METHODS, ErrorKind, TrialTrace
 from app.analysis.units import interval_told, told
+from app.tables import Method
 
-MOMENTS = ("at the end", "all along")
-"""From the final pose; from all sampled poses, each trial counting with its mean."""
+Moment = Literal["at the end", "all along", "from the same poses"]
+"""From the final pose; from all sampled poses, each trial counting with its mean; the same, from those poses
+alone from which every method has a result, where there are several methods."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +24,9 @@ class Gain:
     group: str
     mode: str
     condition: str
+    method: Method
     error: ErrorKind
-    moment: str
+    moment: Moment
     before: Interval
     after: Interval
     gain: Interval
@@ -45,25 +49,45 @@ class Gain:
     @property
     def sentence(self) -> str:
         """The verdict with its numbers."""
+        by = ", by the paper's filter" if self.method == "paper" else ""
         before, after = told(self.before.mean, self.error), told(self.after.mean, self.error)
+        gain, operators = interval_told(self.gain, self.error), counted(self.gain.operators, "operator")
         return (
-            f"{self.group}, {self.mode}, {self.condition}, {self.moment}: {self.verdict}; {self.error} error"
-            f" {before} before and {after} after, gain {interval_told(self.gain, self.error)} over"
-            f" {counted(self.gain.operators, 'operator')}."
+            f"{self.group}, {self.mode}, {self.condition}, {self.moment}{by}: {self.verdict};"
+            f" {self.error} error {before} before and {after} after, gain {gain} over {operators}."
         )
 
 
 def gains(trials: Sequence[TrialTrace], seed: int) -> list[Gain]:
-    """Of trials of one group, mode and condition: for both errors, at the end and all along."""
-    with_stg = [trial for trial in trials if trial.has_stg]
-    return [_gain(with_stg, kind, moment, seed) for kind in ERROR_KINDS for moment in MOMENTS if with_stg]
+    """Of trials of one group, mode and condition: by each method, for both errors, at each moment."""
+    methods = [method for method in METHODS if any(trial.has_stg(method) for trial in trials)]
+    moments: list[Moment] = ["at the end", "all along"]
+    moments += ["from the same poses"] if len(methods) > 1 else []
+    return [
+        _gain([trial for trial in trials if trial.has_stg(method)], kind, method, moment, methods, seed)
+        for kind in ERROR_KINDS
+        for moment in moments
+        for method in methods
+    ]
 
 
-def _gain(trials: Sequence[TrialTrace], kind: ErrorKind, moment: str, seed: int) -> Gain:
-    pairs = [(trial.of_kind(kind), trial.stg_of_kind(kind)) for trial in trials]
-    if moment == "at the end":
-        pairs = [(before[-1:], after[-1:]) for before, after in pairs]
-    known = [(before[np.isfinite(after)], after[np.isfinite(after)]) for before, after in pairs]
+def _gain(
+    trials: Sequence[TrialTrace],
+    kind: ErrorKind,
+    method: Method,
+    moment: Moment,
+    methods: Sequence[Method],
+    seed: int,
+) -> Gain:
+    known = []
+    for trial in trials:
+        snapped = trial.stg_of_kind(kind, method)
+        counts = np.isfinite(snapped)
+        if moment == "at the end":
+            counts[:-1] = False
+        elif moment == "from the same poses":
+            counts &= np.isfinite([trial.stg_of_kind(kind, other) for other in methods]).all(axis=0)
+        known.append((trial.of_kind(kind)[counts], snapped[counts]))
     means = np.array([[b.mean(), a.mean(), (b - a).mean()] if len(a) else [np.nan] * 3 for b, a in known])
     better = np.concatenate([after < before for before, after in known])
     operators = [trial.operator for trial in trials]
@@ -73,6 +97,7 @@ def _gain(trials: Sequence[TrialTrace], kind: ErrorKind, moment: str, seed: int)
         group=first.group,
         mode=first.mode,
         condition=first.condition,
+        method=method,
         error=kind,
         moment=moment,
         before=before,

@@ -5,11 +5,14 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from app.analysis.bootstrap import RESAMPLES, Interval
+from app.analysis.cells import CURVE_NAMES
 from app.analysis.figure import figure_bytes, shown_conditions
 from app.analysis.fitts import Fitts
+from app.analysis.hand_off import HandOff
 from app.analysis.pose_errors import PoseErrors
 from app.analysis.remarks import counted
 from app.analysis.report import Report
+from app.analysis.trial import ErrorKind
 from app.analysis.units import interval_told, number_told, share_told, told
 
 STYLE = """
@@ -77,6 +80,7 @@ def _gains(report: Report) -> str:
             "group",
             "mode",
             "condition",
+            "method",
             "error",
             "from",
             "before",
@@ -91,6 +95,7 @@ def _gains(report: Report) -> str:
                 gain.group,
                 gain.mode,
                 gain.condition,
+                gain.method,
                 gain.error,
                 gain.moment,
                 interval_told(gain.before, gain.error),
@@ -111,6 +116,7 @@ def _hand_offs(report: Report) -> str:
             "group",
             "mode",
             "condition",
+            "method",
             "error",
             "let the machine take over from",
             "saves most at",
@@ -121,22 +127,22 @@ def _hand_offs(report: Report) -> str:
                 cell.group,
                 cell.mode,
                 cell.condition,
+                method,
                 cell.error,
-                told(cell.hand_off.margin, cell.error) + " or more" * cell.hand_off.is_largest
-                if cell.hand_off
-                else "no margin: nothing is saved for sure",
-                told(cell.hand_off.best_margin, cell.error) if cell.hand_off else "–",
-                interval_told(
-                    Interval(cell.hand_off.saved, *cell.hand_off.saved_interval, cell.hand_off.operators),
-                    None,
-                )
-                if cell.hand_off
-                else "–",
+                *_hand_off(stg.hand_off, cell.error),
             )
             for cell in report.cells
-            if cell.stg is not None
+            for method, stg in cell.stg.items()
         ),
     )
+
+
+def _hand_off(point: HandOff | None, error: ErrorKind) -> tuple[str, str, str]:
+    if point is None:
+        return "no margin: nothing is saved for sure", "–", "–"
+    saved = interval_told(Interval(point.saved, *point.saved_interval, point.operators), None)
+    from_there = told(point.margin, error) + " or more" * point.is_largest
+    return from_there, told(point.best_margin, error), saved
 
 
 def _fitts(report: Report) -> str:
@@ -148,7 +154,7 @@ def _fitts(report: Report) -> str:
                 cell.mode,
                 cell.condition,
                 cell.error,
-                hand,
+                CURVE_NAMES[method],
                 told(line.distance, cell.error),
                 line.margins,
                 interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
@@ -157,8 +163,8 @@ def _fitts(report: Report) -> str:
                 _throughput(line),
             )
             for cell in report.cells
-            for hand, drawn in (("human", cell.human), ("STG", cell.stg))
-            if drawn is not None and (line := drawn.fitts) is not None
+            for method, drawn in cell.curves
+            if (line := drawn.fitts) is not None
         ),
     )
 
@@ -224,8 +230,10 @@ def _off(errors: PoseErrors | None) -> str:
 def _method(report: Report) -> list[str]:
     config, algorithm = report.config, report.collected.algorithm
     by = f"; they are of algorithm {algorithm}" if algorithm else ""
+    filtered = any("paper" in cell.stg for cell in report.cells)
+    paper = f", by the paper's filter with {config.paper_seconds:g} s" if filtered else ""
     return [
-        f"Each offline snap is charged with {config.snap_seconds:g} s{by}.",
+        f"Each offline snap is charged with {config.snap_seconds:g} s{paper}{by}.",
         "Idle time is left out." if config.without_idle else "Idle time counts.",
         "The ground truth of an object is the mean of the accurate registrations by hand."
         if config.truth == "operators"

@@ -10,7 +10,7 @@ import numpy as np
 from app.analysis.cells import Cell, cells_of, key_of
 from app.analysis.collect import Collected, TruthSource, trials_of
 from app.analysis.comparison import Comparison, comparisons
-from app.analysis.curves import MARGINS, SNAP_SECONDS, Timing
+from app.analysis.curves import MARGINS, PAPER_SECONDS, SNAP_SECONDS, Timing
 from app.analysis.gains import Gain, gains
 from app.analysis.remarks import Remark, counted
 from app.analysis.selection import Selection
@@ -24,17 +24,19 @@ class ReportConfig:
     """How a report is computed; stated in it."""
 
     snap_seconds: float = SNAP_SECONDS
-    """That each offline snap is charged with."""
+    """That each offline snap by the default is charged with."""
     without_idle: bool = False
     """Whether idle time is left out."""
     truth: TruthSource = "operators"
     seed: int = 0
     """Of the bootstrap."""
+    paper_seconds: float = PAPER_SECONDS
+    """That each offline snap by the paper's filter is charged with."""
 
     @property
     def timing(self) -> Timing:
         """How time is counted."""
-        return Timing(self.snap_seconds, self.without_idle)
+        return Timing(self.snap_seconds, self.without_idle, self.paper_seconds)
 
 
 @dataclass(frozen=True, eq=False)

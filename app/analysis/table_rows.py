@@ -6,19 +6,20 @@ from typing import Any
 from app.analysis.bootstrap import Interval
 from app.analysis.cells import Cell, Drawn
 from app.analysis.report import Report
-from app.analysis.trial import ErrorKind, TrialTrace
+from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
 from app.analysis.units import in_people_units
+from app.tables import Method
 
 Row = dict[str, Any]
 UNIT_NAMES: Mapping[ErrorKind, str] = {"translation": "mm", "rotation": "deg"}
 
 
 def _curve_rows(report: Report) -> Iterator[Row]:
-    for cell, hand, drawn in _drawn(report):
+    for cell, method, drawn in _drawn(report):
         curve = drawn.curve
         for k, margin in enumerate(curve.margins.tolist()):
             yield _cell_row(cell) | {
-                "hand": hand,
+                **_hand_row(method),
                 "margin": in_people_units(margin, cell.error),
                 "seconds": float(curve.mean[k]),
                 "seconds_low": float(curve.low[k]),
@@ -31,10 +32,10 @@ def _curve_rows(report: Report) -> Iterator[Row]:
 
 
 def _fitts_rows(report: Report) -> Iterator[Row]:
-    for cell, hand, drawn in _drawn(report):
+    for cell, method, drawn in _drawn(report):
         if (line := drawn.fitts) is not None:
             yield _cell_row(cell) | {
-                "hand": hand,
+                **_hand_row(method),
                 "distance": in_people_units(line.distance, cell.error),
                 "margins": line.margins,
                 "a": line.a,
@@ -51,9 +52,11 @@ def _fitts_rows(report: Report) -> Iterator[Row]:
 
 
 def _hand_off_rows(report: Report) -> Iterator[Row]:
-    for cell in report.cells:
-        if (point := cell.hand_off) is not None:
+    curves = [(cell, method, stg) for cell in report.cells for method, stg in cell.stg.items()]
+    for cell, method, stg in curves:
+        if (point := stg.hand_off) is not None:
             yield _cell_row(cell) | {
+                "method": method,
                 "margin": in_people_units(point.margin, cell.error),
                 "is_largest": point.is_largest,
                 "best_margin": in_people_units(point.best_margin, cell.error),
@@ -72,6 +75,7 @@ def _gain_rows(report: Report) -> Iterator[Row]:
             "condition": gain.condition,
             "error": gain.error,
             "unit": UNIT_NAMES[gain.error],
+            "method": gain.method,
             "moment": gain.moment,
             **_interval_row("before", gain.before, gain.error),
             **_interval_row("after", gain.after, gain.error),
@@ -159,11 +163,12 @@ ROWS: Mapping[str, Callable[[Report], Iterator[Row]]] = {
 }
 
 
-def _drawn(report: Report) -> Iterator[tuple[Cell, str, Drawn]]:
-    for cell in report.cells:
-        yield cell, "human", cell.human
-        if cell.stg is not None:
-            yield cell, "stg", cell.stg
+def _drawn(report: Report) -> Iterator[tuple[Cell, Method | None, Drawn]]:
+    return ((cell, method, drawn) for cell in report.cells for method, drawn in cell.curves)
+
+
+def _hand_row(method: Method | None) -> Row:
+    return {"hand": "human" if method is None else "stg", "method": method}
 
 
 def _cell_row(cell: Cell) -> Row:
@@ -189,6 +194,14 @@ def _sample_row(trial: TrialTrace, i: int) -> Row:
         "seconds": float(trial.seconds[i]),
         "translation_mm": in_people_units(float(trial.errors.translation[i]), "translation"),
         "rotation_deg": in_people_units(float(trial.errors.rotation[i]), "rotation"),
-        "stg_translation_mm": in_people_units(float(trial.stg_errors.translation[i]), "translation"),
-        "stg_rotation_deg": in_people_units(float(trial.stg_errors.rotation[i]), "rotation"),
+        **_stg_row("stg", trial, "default", i),
+        **_stg_row("paper", trial, "paper", i),
+    }
+
+
+def _stg_row(name: str, trial: TrialTrace, method: Method, i: int) -> Row:
+    translation, rotation = (float(trial.stg_of_kind(kind, method)[i]) for kind in ERROR_KINDS)
+    return {
+        f"{name}_translation_mm": in_people_units(translation, "translation"),
+        f"{name}_rotation_deg": in_people_units(rotation, "rotation"),
     }

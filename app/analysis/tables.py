@@ -22,6 +22,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
         [
             *CELL,
             ("hand", TEXT),
+            ("method", TEXT),
             ("margin", NUMBER),
             ("seconds", NUMBER),
             ("seconds_low", NUMBER),
@@ -37,6 +38,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
         [
             *CELL,
             ("hand", TEXT),
+            ("method", TEXT),
             ("distance", NUMBER),
             ("margins", INTEGER),
             *((name, NUMBER) for name in ("a", "a_low", "a_high", "b", "b_low", "b_high", "r_squared")),
@@ -47,6 +49,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
     "hand_off": pa.schema(
         [
             *CELL,
+            ("method", TEXT),
             ("margin", NUMBER),
             ("is_largest", TRUTH),
             ("best_margin", NUMBER),
@@ -60,6 +63,7 @@ SCHEMAS: Mapping[str, pa.Schema] = {
     "gains": pa.schema(
         [
             *CELL,
+            ("method", TEXT),
             ("moment", TEXT),
             *(
                 (f"{name}{end}", NUMBER)
@@ -105,6 +109,8 @@ SCHEMAS: Mapping[str, pa.Schema] = {
             ("rotation_deg", NUMBER),
             ("stg_translation_mm", NUMBER),
             ("stg_rotation_deg", NUMBER),
+            ("paper_translation_mm", NUMBER),
+            ("paper_rotation_deg", NUMBER),
             SIMULATED,
         ]
     ),
@@ -117,6 +123,8 @@ SCHEMAS: Mapping[str, pa.Schema] = {
             ("rotation_deg", NUMBER),
             ("stg_translation_mm", NUMBER),
             ("stg_rotation_deg", NUMBER),
+            ("paper_translation_mm", NUMBER),
+            ("paper_rotation_deg", NUMBER),
             SIMULATED,
         ]
     ),

@@ -17,7 +17,7 @@ from app.analysis.pose_errors import PoseErrors, pose_errors
 from app.analysis.remarks import Remark
 from app.analysis.runs import TASK_PARTS, place_name, scene_name, symmetries_of
 from app.analysis.trace import Trace, trace_of, until_submission
-from app.analysis.trial import TrialInfo, TrialTrace, traced, without_snaps
+from app.analysis.trial import Snapped, TrialInfo, TrialTrace, traced, without_snaps
 from app.database import Database
 from app.tables import Participant, Registration, utc_now
 
@@ -124,7 +124,7 @@ def _work(row: Registration, log: Sequence[LoggedRow], symmetries: Array) -> Wor
     )
     errors = pose_errors(trace.motion.at(times), T_truth, symmetries)
     return Work(
-        trial=traced(info, trace, times, errors, _when_they_came(trace, times, snaps, results)),
+        trial=traced(info, trace, times, errors, {"default": _when_they_came(trace, times, snaps, results)}),
         week=f"{year}-W{week:02d}",
         starts=starts,
         results=results,
@@ -133,15 +133,13 @@ def _work(row: Registration, log: Sequence[LoggedRow], symmetries: Array) -> Wor
     )
 
 
-def _when_they_came(
-    trace: Trace, times: Array, snaps: Sequence[MachinePose], results: PoseErrors
-) -> PoseErrors:
+def _when_they_came(trace: Trace, times: Array, snaps: Sequence[MachinePose], results: PoseErrors) -> Snapped:
     """Errors of results at the samples (M,) that follow them, NaN at the others."""
     errors = without_snaps(len(times))
     places = np.searchsorted(times, [min(snap.seconds, trace.duration) for snap in snaps])
     errors.translation[places] = results.translation
     errors.rotation[places] = results.rotation
-    return errors
+    return Snapped(errors, np.isfinite(errors.translation))
 
 
 def _key(work: Work) -> tuple[str, str, str]:

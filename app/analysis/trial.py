@@ -1,17 +1,22 @@
 """One operator's registration of one object, as errors over time."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.pose_errors import PoseErrors
 from app.analysis.trace import Trace
+from app.tables import Method
 
 Array = NDArray[np.float64]
 ErrorKind = Literal["translation", "rotation"]
 ERROR_KINDS: tuple[ErrorKind, ...] = ("translation", "rotation")
+
+
+METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True)
@@ -31,6 +36,16 @@ class TrialInfo:
 
 
 @dataclass(frozen=True, eq=False)
+class Snapped:
+    """What snaps by one method give from the M samples of a trial."""
+
+    errors: PoseErrors
+    """(M,) each, NaN where there is none."""
+    computed: NDArray[np.bool_]
+    """(M,), from which samples a snap was computed, though it failed."""
+
+
+@dataclass(frozen=True, eq=False)
 class TrialTrace(TrialInfo):
     """What the curves are made of. Samples are 0.5 s apart, the last one is the end."""
 
@@ -42,23 +57,27 @@ class TrialTrace(TrialInfo):
     """(M,), whether nothing happened for 10 s or more about then."""
     errors: PoseErrors
     """Of the pose at these times."""
-    stg_errors: PoseErrors
-    """Of what a snap gives from there; NaN where there is none."""
-    missing_snaps: int
-    """Samples from which a snap is still to be computed; 0 in ordinary work, where none is."""
+    stg: Mapping[Method, Snapped]
+    """By the methods by which any was computed; in ordinary work whatever was made is under `default`."""
 
     def of_kind(self, kind: ErrorKind) -> Array:
         """Errors (M,) of the pose, metres or radians."""
         return self.errors.translation if kind == "translation" else self.errors.rotation
 
-    def stg_of_kind(self, kind: ErrorKind) -> Array:
+    def stg_of_kind(self, kind: ErrorKind, method: Method = "default") -> Array:
         """Errors (M,) after a snap from there, metres or radians, NaN where there is none."""
-        return self.stg_errors.translation if kind == "translation" else self.stg_errors.rotation
+        if method not in self.stg:
+            return np.full(len(self.seconds), np.nan)
+        errors = self.stg[method].errors
+        return errors.translation if kind == "translation" else errors.rotation
 
-    @property
-    def has_stg(self) -> bool:
-        """Whether any snap was computed."""
-        return bool(np.isfinite(self.stg_errors.translation).any())
+    def has_stg(self, method: Method = "default") -> bool:
+        """Whether any snap by a method has a result."""
+        return bool(np.isfinite(self.stg_of_kind("translation", method)).any())
+
+    def missing_snaps(self, method: Method = "default") -> int:
+        """Samples from which no snap by a method was computed."""
+        return len(self.seconds) - (int(self.stg[method].computed.sum()) if method in self.stg else 0)
 
 
 def traced(
@@ -66,8 +85,7 @@ def traced(
     trace: Trace,
     times: Array,
     errors: PoseErrors,
-    stg_errors: PoseErrors,
-    missing_snaps: int = 0,
+    stg: Mapping[Method, Snapped],
 ) -> TrialTrace:
     """Join what is known of a trial at the times (M,) of its trace."""
     seconds = times - trace.first_sight
@@ -77,8 +95,7 @@ def traced(
         active_seconds=seconds - trace.idle_before(times),
         idle=trace.is_idle(times),
         errors=errors,
-        stg_errors=stg_errors,
-        missing_snaps=missing_snaps,
+        stg=stg,
     )
 
 

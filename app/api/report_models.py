@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from pydantic import BaseModel, Field
 
 from app.analysis.bootstrap import Interval
-from app.analysis.cells import Cell, Drawn
+from app.analysis.cells import Cell, Drawn, StgCurve
 from app.analysis.comparison import Comparison
 from app.analysis.fitts import Fitts
-from app.analysis.gains import Gain
+from app.analysis.gains import Gain, Moment
 from app.analysis.remarks import Remark
 from app.analysis.trial import ErrorKind
+from app.tables import Method
 
 
 class IntervalOut(BaseModel):
@@ -68,6 +70,12 @@ class HandOffOut(BaseModel):
     operators: int
 
 
+class StgOut(CurveOut):
+    """The curve of snaps by one method."""
+
+    hand_off: HandOffOut | None
+
+
 class CellOut(BaseModel):
     """The curves of a group, mode and condition by one error."""
 
@@ -78,8 +86,7 @@ class CellOut(BaseModel):
     operators: int
     trials: int
     human: CurveOut
-    stg: CurveOut | None
-    hand_off: HandOffOut | None
+    stg: dict[Method, StgOut] = Field(description="by the methods by which any snap was computed")
 
 
 class GainOut(BaseModel):
@@ -88,8 +95,9 @@ class GainOut(BaseModel):
     group: str
     mode: str
     condition: str
+    method: Method
     error: ErrorKind
-    moment: str
+    moment: Moment
     before: IntervalOut
     after: IntervalOut
     gain: IntervalOut
@@ -122,7 +130,6 @@ class RemarkOut(BaseModel):
 
 def cell_out(cell: Cell) -> CellOut:
     """A cell as JSON."""
-    point = cell.hand_off
     return CellOut(
         group=cell.group,
         mode=cell.mode,
@@ -130,9 +137,8 @@ def cell_out(cell: Cell) -> CellOut:
         error=cell.error,
         operators=cell.operators,
         trials=cell.trials,
-        human=_curve(cell.human),
-        stg=None if cell.stg is None else _curve(cell.stg),
-        hand_off=None if point is None else HandOffOut(**vars(point)),
+        human=CurveOut(**_curve(cell.human)),
+        stg={method: _stg(curve) for method, curve in cell.stg.items()},
     )
 
 
@@ -165,10 +171,15 @@ def number(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _curve(drawn: Drawn) -> CurveOut:
+def _stg(drawn: StgCurve) -> StgOut:
+    point = drawn.hand_off
+    return StgOut(**_curve(drawn), hand_off=None if point is None else HandOffOut(**vars(point)))
+
+
+def _curve(drawn: Drawn) -> dict[str, Any]:
     curve = drawn.curve
-    return CurveOut(
-        points=[
+    return {
+        "points": [
             PointOut(
                 margin=float(curve.margins[k]),
                 seconds=number(curve.mean[k]),
@@ -181,8 +192,8 @@ def _curve(drawn: Drawn) -> CurveOut:
             )
             for k in range(len(curve.margins))
         ],
-        fitts=None if drawn.fitts is None else _fitts(drawn.fitts),
-    )
+        "fitts": None if drawn.fitts is None else _fitts(drawn.fitts),
+    }
 
 
 def _fitts(line: Fitts) -> FittsOut:

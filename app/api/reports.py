@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query, Response
 from pydantic import BaseModel, Field
 
 from app.analysis.collect import TruthSource
-from app.analysis.curves import SNAP_SECONDS
+from app.analysis.curves import PAPER_SECONDS, SNAP_SECONDS
 from app.analysis.report import Report, ReportConfig, report_of
 from app.analysis.selection import Selection, choices_of
 from app.analysis.trial import ErrorKind
@@ -43,6 +43,7 @@ class ConfigOut(BaseModel):
     without_idle: bool
     truth: TruthSource
     seed: int
+    paper_seconds: float
 
 
 class TruthOut(BaseModel):
@@ -82,9 +83,12 @@ def asked_config(
     without_idle: Annotated[bool, Query(description="leave idle time out")] = False,
     truth: Annotated[TruthSource, Query(description="what errors are measured from")] = "operators",
     seed: Annotated[int, Query(ge=0, le=2**31 - 1, description="of the bootstrap")] = 0,
+    paper_seconds: Annotated[
+        float, Query(ge=0, le=60, description="charged for each offline snap by the paper's filter")
+    ] = PAPER_SECONDS,
 ) -> ReportConfig:
     """How the report is to be computed."""
-    return ReportConfig(snap_seconds, without_idle, truth, seed)
+    return ReportConfig(snap_seconds, without_idle, truth, seed, paper_seconds)
 
 
 def asked_selection(

@@ -5,7 +5,7 @@ import { chart, legendEntry } from "./chart.js";
 import { digits, inPeopleUnits, secondsText, shareText, unitOf } from "./numbers.js";
 import { replayLink, section, tableOf } from "./tables.js";
 
-/** Draws a chart for each group and error of the cells; `names` are what the two lines of a cell are called. */
+/** Draws a chart for each group and error of the cells; `names` are what the lines of a cell are called. */
 export function drawPanels(cells, names, { errors, isSimulated }) {
   const shown = cells.filter(({ error }) => errors.includes(error));
   const keys = [...new Map(shown.map((cell) => [`${cell.group}, ${cell.error}`, cell])).entries()];
@@ -34,17 +34,20 @@ function pointRow({ group, error }, { name }, { margin, seconds, low, high, oper
   return [group, name, within, secondsText(seconds), interval, operators, trials, shareText(share), replayLink(id)];
 }
 
+/** The human's line, and those of the snaps by method: {hand, points, fitts}; `hand` is "human", "default" or "paper". */
+export function linesOf({ human, stg }) {
+  return [{ hand: "human", ...human }, ...Object.entries(stg).map(([method, line]) => ({ hand: method, ...line }))];
+}
+
 function seriesOf(cell, names) {
-  return ["human", "stg"]
-    .filter((hand) => cell[hand] !== null)
-    .map((hand) => ({
-      name: [names[hand], cell.mode, cell.condition === "manual" ? null : cell.condition].filter(Boolean).join(", "),
-      hand,
-      mode: cell.mode,
-      points: cell[hand].points.map(({ registration_id: id, ...point }) => ({
-        ...point,
-        id,
-        margin: inPeopleUnits(point.margin, cell.error),
-      })),
-    }));
+  return linesOf(cell).map(({ hand, points }) => ({
+    name: [names[hand], cell.mode, cell.condition === "manual" ? null : cell.condition].filter(Boolean).join(", "),
+    hand,
+    mode: cell.mode,
+    points: points.map(({ registration_id: id, ...point }) => ({
+      ...point,
+      id,
+      margin: inPeopleUnits(point.margin, cell.error),
+    })),
+  }));
 }

@@ -2,13 +2,13 @@
 
 import { get } from "../api.js";
 import { byId, element, setText } from "../dom.js";
-import { count } from "../format.js";
+import { count, METHODS } from "../format.js";
 import { ERROR_FIELD, errorsOf, setUpChoices } from "./choices.js";
 import { digits, errorText, intervalText, secondsText, shareText } from "./numbers.js";
-import { curvesSection, drawPanels } from "./panels.js";
+import { curvesSection, drawPanels, linesOf } from "./panels.js";
 import { remarksSection, section, tableOf } from "./tables.js";
 
-const NAMES = { human: "human", stg: "STG" };
+const NAMES = { human: "human", default: "STG", paper: "STG, paper’s filter" };
 const TABLES = ["curves", "fitts", "hand_off", "gains", "comparisons", "trials", "samples", "truths", "remarks"];
 
 export async function showStudy(studyId, message) {
@@ -78,9 +78,9 @@ function rotation({ gains }) {
   const rows = gains.map((gain) => {
     const told = (value) => errorText(value, gain.error);
     const intervals = ["before", "after", "gain"].map((name) => intervalText(gain[name], told));
-    return [...cellOf(gain), gain.moment, ...intervals, shareText(gain.improved), gain.gain.operators, gain.verdict];
+    return [...cellOf(gain), METHODS[gain.method].name, gain.moment, ...intervals, shareText(gain.improved), gain.gain.operators, gain.verdict];
   });
-  const head = ["group", "mode", "condition", "error", "from", "before", "after", "gain", "better", "operators", "verdict"];
+  const head = ["group", "mode", "condition", "error", "method", "from", "before", "after", "gain", "better", "operators", "verdict"];
   return section(
     "Does a snap improve rotation as well?",
     element("ul", {}, ...answers.map(({ sentence }) => element("li", {}, sentence))),
@@ -89,26 +89,25 @@ function rotation({ gains }) {
 }
 
 function handOffs({ cells }) {
-  const rows = cells
-    .filter(({ stg }) => stg !== null)
-    .map((cell) => {
-      const point = cell.hand_off;
-      if (point === null) return [...cellOf(cell), "no margin: nothing is saved for sure", "–", "–"];
+  const rows = cells.flatMap((cell) =>
+    Object.entries(cell.stg).map(([method, { hand_off: point }]) => {
+      const which = [...cellOf(cell), METHODS[method].name];
+      if (point === null) return [...which, "no margin: nothing is saved for sure", "–", "–"];
       const [low, high] = point.saved_interval;
       const saved = intervalText({ mean: point.saved, low, high }, secondsText);
       const from = `${errorText(point.margin, cell.error)}${point.is_largest ? " or more" : ""}`;
-      return [...cellOf(cell), from, errorText(point.best_margin, cell.error), saved];
-    });
-  const head = ["group", "mode", "condition", "error", "let the machine take over from", "saves most at", "seconds saved there"];
+      return [...which, from, errorText(point.best_margin, cell.error), saved];
+    }),
+  );
+  const head = ["group", "mode", "condition", "error", "method", "let the machine take over from", "saves most at", "seconds saved there"];
   return rows.length ? section("Hand-off", tableOf(head, rows)) : null;
 }
 
 function fitts({ cells }) {
   const rows = cells.flatMap((cell) =>
-    ["human", "stg"]
-      .filter((hand) => cell[hand]?.fitts)
-      .map((hand) => {
-        const line = cell[hand].fitts;
+    linesOf(cell)
+      .filter(({ fitts: line }) => line)
+      .map(({ hand, fitts: line }) => {
         const told = (name) => intervalText({ mean: line[name], low: line[`${name}_interval`][0], high: line[`${name}_interval`][1] }, secondsText);
         const bits = intervalText({ mean: line.throughput, low: line.throughput_interval[0], high: line.throughput_interval[1] }, digits);
         return [...cellOf(cell), NAMES[hand], errorText(line.distance, cell.error), line.margins, told("a"), told("b"), digits(line.r_squared), bits];
@@ -144,13 +143,14 @@ function truths({ truths: places }) {
   return rows.length ? section("Ground truth", tableOf(["object", "registrations", "spread", "off the reference"], rows)) : null;
 }
 
-function method({ config, algorithm }) {
+function method({ config, algorithm, cells }) {
+  const paper = cells.some(({ stg }) => stg.paper) ? `, by the paper’s filter with ${config.paper_seconds} s` : "";
   return section(
     "How the numbers are made",
     element(
       "p",
       {},
-      `Each offline snap is charged with ${config.snap_seconds} s${algorithm ? `; they are of algorithm ${algorithm}` : ""}. Idle time ${config.without_idle ? "is left out" : "counts"}. ` +
+      `Each offline snap is charged with ${config.snap_seconds} s${paper}${algorithm ? `; they are of algorithm ${algorithm}` : ""}. Idle time ${config.without_idle ? "is left out" : "counts"}. ` +
         `Intervals hold 95 %, by bootstrap over operators with seed ${config.seed}. Means are over operators who come within a margin.`,
     ),
   );

@@ -9,7 +9,7 @@ import { curvesSection, drawPanels } from "./panels.js";
 import { remarksSection, section, tableOf } from "./tables.js";
 
 const URL_OF_TEAM = "/api/reports/team";
-const NAMES = { human: "as done", stg: "the machine's poses" };
+const NAMES = { human: "as done", default: "the machine's poses" };
 
 export async function showTeam(message) {
   const { choices } = await get(URL_OF_TEAM);

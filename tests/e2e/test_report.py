@@ -45,6 +45,9 @@ def study(server: Server) -> int:
                     float(t): at(0.0015 + 0.03 / t**2, rng.uniform(0.01, 0.02 + 0.4 / t)) for t in samples
                 }
                 made.snaps(registration, snaps)
+                few = [*samples[:-1:3], samples[-1]]
+                by_paper = {float(t): at(0.004 + 0.04 / t**2, 0.05 + 0.5 / t) for t in few}
+                made.snaps(registration, by_paper, method="paper")
             if group == "novice":
                 made.trial(participant, log_of(0.5, 0.002), mode="quick", condition="find it")
     late = [*log_of(1.0, 0.0)[:-1], moved(9.0, "submit", at(0.0), late=99.0)]
@@ -71,6 +74,8 @@ def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
     expect(page.locator("#about")).to_contain_text("21 trials")
     expect(page.locator("#sections")).to_contain_text("the clock was put forward by 99 s")
     expect(page.locator("#sections")).to_contain_text("group child: has no operators")
+    expect(page.locator("#legend")).to_contain_text("STG, paper’s filter, accurate")
+    expect(page.locator("#sections")).to_contain_text("from the same poses, by the paper's filter")
     take_picture(page, "report")
     page.locator("#sections").scroll_into_view_if_needed()
     page.set_viewport_size({"width": 1920, "height": 1080})
@@ -107,7 +112,7 @@ def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
 def test_the_numbers_are_there_as_a_table_and_as_files(page: Page) -> None:
     table = page.locator("section", has_text="The curves as a table")
     table.get_by_text("Show the table").click()
-    assert table.locator("tbody tr").count() == 8 * 2 * 41
+    assert table.locator("tbody tr").count() == 8 * 3 * 41
     pairs = page.locator("section", has_text="Conditions in pairs").locator("tbody tr")
     expect(pairs).to_have_count(2)  # of novices, and of everybody
     expect(pairs.first).to_contain_text("novicequickfind it − manual44")

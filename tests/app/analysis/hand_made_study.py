@@ -102,6 +102,7 @@ class HandMadeStudy:
         registration_id: int,
         results: dict[float, np.ndarray | None],
         algorithm: str | None = ALGORITHM,
+        method: str = "default",
     ) -> None:
         """Offline snaps by seconds of the trace; None is one that failed."""
         with self.database.write() as session:
@@ -110,7 +111,8 @@ class HandMadeStudy:
                     registration_id=registration_id,
                     seconds=seconds,
                     T_world_object_start=START.tolist(),
-                    input_hash=f"{seconds} {algorithm}",
+                    input_hash=f"{seconds} {algorithm} {method}",
+                    method=method,
                     config={},
                     seed=1,
                     T_world_object=None if T is None else T.tolist(),

@@ -51,7 +51,7 @@ def test_errors_are_those_from_the_mean_of_the_accurate_registrations_by_hand(da
     half = np.abs(MARGINS["translation"] - 0.0501).argmin()
     assert MARGINS["translation"][half] > 0.049
     assert cell.human.curve.mean[half] == pytest.approx((2.0 + 3.0) / 2)  # 3 s and 4 s less the first sight
-    assert cell.human.curve.share[half] == 1.0 and cell.stg is None
+    assert cell.human.curve.share[half] == 1.0 and cell.stg == {}
 
 
 def test_snaps_are_put_beside_the_poses_that_they_began_from(database):
@@ -62,12 +62,12 @@ def test_snaps_are_put_beside_the_poses_that_they_began_from(database):
     study.snaps(registration, {1.0 + 1e-9: at(0.003, 0.03)})  # computed again later: the newest counts
     collected = trials_of(database, study.id)
     (trial,) = collected.trials
-    assert trial.stg_errors.translation[0] == pytest.approx(0.003)
-    assert trial.stg_errors.rotation[0] == pytest.approx(0.03)
-    assert np.isnan(trial.stg_errors.translation[1:]).all()
+    assert trial.stg["default"].errors.translation[0] == pytest.approx(0.003)
+    assert trial.stg["default"].errors.rotation[0] == pytest.approx(0.03)
+    assert np.isnan(trial.stg["default"].errors.translation[1:]).all()
     assert "offline snaps: 1 of 2 failed" in said(collected)
     # 5 s are sampled at 11 poses, two of which have their snap
-    assert trial.missing_snaps == 9 and "offline snaps: 9 of 11 sampled poses have none yet" in said(
+    assert trial.missing_snaps() == 9 and "offline snaps: 9 of 11 sampled poses have none yet" in said(
         collected
     )
     assert collected.algorithm == ALGORITHM and "algorithm" not in said(collected)
@@ -79,16 +79,16 @@ def test_snaps_of_two_algorithms_are_never_mixed(database):
     assert registration is not None
     study.snaps(registration, every_half_second(6.0, at(0.2)), algorithm=None)
     before = trials_of(database, study.id)
-    assert before.algorithm is None and before.trials[0].stg_errors.translation == pytest.approx(0.2)
+    assert before.algorithm is None and before.trials[0].stg_of_kind("translation") == pytest.approx(0.2)
     assert f"of a version that did not name its algorithm, while this version has algorithm {ALGORITHM};" in (
         said(before)
     )
     study.snaps(registration, dict(list(every_half_second(6.0, at(0.0)).items())[:3]))
     half_way = trials_of(database, study.id)
-    assert half_way.algorithm is None and half_way.trials[0].stg_errors.translation == pytest.approx(0.2)
+    assert half_way.algorithm is None and half_way.trials[0].stg_of_kind("translation") == pytest.approx(0.2)
     study.snaps(registration, dict(list(every_half_second(6.0, at(0.0)).items())[3:]))
     after = trials_of(database, study.id)
-    assert after.algorithm == ALGORITHM and after.trials[0].stg_errors.translation == pytest.approx(0.0)
+    assert after.algorithm == ALGORITHM and after.trials[0].stg_of_kind("translation") == pytest.approx(0.0)
     assert said(after) == ""
 
 
@@ -175,8 +175,34 @@ def test_curves_of_snaps_begin_at_once_and_the_hand_off_is_found(database):
         assert registration is not None
         study.snaps(registration, every_half_second(end, at(0.0)))
     cell = cells_of(trials_of(database, study.id).trials, Timing(), seed=0)[0]
-    assert cell.stg is not None and cell.hand_off is not None
-    assert (cell.stg.curve.mean == 0.1).all() and (cell.stg.curve.share == 1.0).all()
+    stg = cell.stg["default"]
+    assert stg.hand_off is not None
+    assert (stg.curve.mean == 0.1).all() and (stg.curve.share == 1.0).all()
     # by hand below 99 mm at 2 s, below 50 mm at 5 s and 7 s: the curves part just below 100 mm
-    assert cell.hand_off.margin == pytest.approx(MARGINS["translation"][1])
-    assert cell.hand_off.saved == pytest.approx(6.0 - 0.1)
+    assert stg.hand_off.margin == pytest.approx(MARGINS["translation"][1])
+    assert stg.hand_off.saved == pytest.approx(6.0 - 0.1)
+
+
+def test_snaps_by_the_papers_filter_stand_beside_those_by_the_default(database):
+    study = HandMadeStudy(database)
+    registration = study.trial(study.participant("P1"), two_moves(3.0, 6.0, at(0.0)))
+    other = study.trial(study.participant("P2"), two_moves(3.0, 6.0, at(0.0)))
+    assert registration is not None and other is not None
+    for one in (registration, other):
+        study.snaps(one, every_half_second(6.0, at(0.002)))
+    study.snaps(registration, {1.0: at(0.02), 4.0: None, 6.0: at(0.01)}, method="paper")
+    study.snaps(other, {1.0: at(0.02)}, method="paper", algorithm="an older one")
+    collected = trials_of(database, study.id)
+    first, second = collected.trials
+    assert np.isfinite(first.stg_of_kind("translation")).all()
+    paper = first.stg_of_kind("translation", "paper")
+    assert paper[[0, -1]] == pytest.approx([0.02, 0.01]) and np.isnan(paper[1:-1]).all()
+    assert list(second.stg) == ["default"]  # the other one is of another algorithm
+    text = said(collected)
+    about = "offline snaps by the paper's filter"
+    assert f"{about}: 3 of 22 sampled poses have one" in text
+    assert f"{about}: 1 of 2 trials have none at their end yet" in text and "--method paper" in text
+    assert f"{about}: 1 of 3 failed" in text
+    (cell, *_) = cells_of(collected.trials, Timing(paper_seconds=3.0), seed=0)
+    assert list(cell.stg) == ["default", "paper"]
+    assert cell.stg["default"].curve.mean[0] == 0.1 and cell.stg["paper"].curve.mean[0] == 3.0

@@ -38,3 +38,24 @@ def test_a_gain_about_zero_and_a_loss_are_said():
 def test_no_snap_from_the_end_is_no_number():
     (end, *_) = gains([trial([0.1, 0.2], stg_translation=[0.1, NAN])], seed=0)
     assert end.trials == 0 and np.isnan(end.gain.mean) and np.isnan(end.improved)
+
+
+def test_methods_are_compared_from_the_poses_that_both_have():
+    one, other = (
+        trial(
+            [0.1, 0.04, 0.02], [0.5, 0.3, 0.2], [0.01] * 3, [0.1] * 3,
+            paper_translation=[0.05, NAN, 0.01], paper_rotation=[0.6, NAN, 0.2], operator=code,
+        )
+        for code in ("P1", "P2")
+    )  # fmt: skip
+    found = {(gain.error, gain.moment, gain.method): gain for gain in gains([one, other], seed=0)}
+    assert len(found) == 2 * 3 * 2
+    for moment in ("all along", "from the same poses"):
+        paper = found["rotation", moment, "paper"]
+        assert (paper.before.mean, paper.after.mean) == pytest.approx((0.35, 0.4))
+        assert paper.verdict == "a snap worsens it"
+    assert "from the same poses, by the paper's filter: a snap worsens it;" in paper.sentence
+    assert found["rotation", "all along", "default"].before.mean == pytest.approx(1.0 / 3.0)
+    same = found["rotation", "from the same poses", "default"]
+    assert (same.before.mean, same.gain.mean) == pytest.approx((0.35, 0.25))
+    assert found["translation", "at the end", "paper"].gain.mean == pytest.approx(0.01)

@@ -17,7 +17,7 @@ from app.analysis.report_files import file_names, file_of
 from app.analysis.selection import Selection, choices_of
 from app.analysis.units import interval_told, told
 from tests.app.analysis.hand_made import at
-from tests.app.analysis.trials import trial
+from tests.app.analysis.trials import NAN, trial
 
 SNAPPED = {"stg_translation": [0.002] * 4, "stg_rotation": [0.02] * 4}
 FAR = trial([0.5, 0.4], [1.0, 0.9], operator="P9", group="novice", registration_id=9)
@@ -130,6 +130,30 @@ def test_techniques_have_a_figure_each_and_are_compared_in_pairs_in_the_page():
     assert "<td>find it − manual</td><td>2</td>" in html
     svg = file_of(techniques, "figure.svg").decode()
     assert ": manual</text>" in svg and ": find it</text>" not in svg
+
+
+def test_both_methods_stand_side_by_side_in_figure_page_and_tables():
+    by_paper = {"paper_translation": [0.02, 0.02, NAN, 0.005], "paper_rotation": [0.5, 0.4, NAN, 0.2]}
+    both = report_of(collected_of(four("P1", **by_paper), four("P2", **by_paper)), ReportConfig())
+    words = " ".join(ET.fromstring(file_of(both, "figure.svg").decode()).itertext())
+    assert "STG, accurate" in words and "STG, paper's filter, accurate" in words
+    html = file_of(both, "report.html").decode()
+    assert "charged with 0.1 s, by the paper&#x27;s filter with 7 s" in html
+    assert "from the same poses, by the paper&#x27;s filter" in html
+    for name in ("curves", "hand_off", "gains"):
+        rows = list(csv.DictReader(io.StringIO(file_of(both, f"{name}.csv").decode())))
+        assert {row["method"] for row in rows} >= {"default"}
+    curves = list(csv.DictReader(io.StringIO(file_of(both, "curves.csv").decode())))
+    assert {(row["hand"], row["method"]) for row in curves} == {
+        ("human", ""),
+        ("stg", "default"),
+        ("stg", "paper"),
+    }
+    first = next(row for row in curves if row["method"] == "paper" and row["unit"] == "mm")
+    assert float(first["seconds"]) == 7.0
+    samples = pq.read_table(io.BytesIO(file_of(both, "samples.parquet"))).to_pylist()
+    assert (samples[0]["stg_translation_mm"], samples[0]["paper_translation_mm"]) == (2.0, 20.0)
+    assert samples[2]["paper_rotation_deg"] is None
 
 
 def test_idle_time_is_said_whether_or_not_it_counts():

@@ -48,7 +48,7 @@ def test_what_became_of_the_machine_s_poses_is_told(database):
     assert one.starts.translation == pytest.approx([0.041, 0.041, 0.0])  # from where each was asked
     assert one.results.translation == pytest.approx([0.199, 0.001, 0.099])
     assert (one.accepted, one.snaps, one.drags_after) == (1, 3, 1)  # a was undone, c was only offered
-    came = np.flatnonzero(np.isfinite(one.trial.stg_errors.translation))
+    came = np.flatnonzero(np.isfinite(one.trial.stg_of_kind("translation")))
     assert one.trial.seconds[came] == pytest.approx([4.0, 6.5, 8.5])
     (row,) = team_rows([one])
     assert row.active_seconds == pytest.approx(8.0)  # from 1 s to 9 s; then 16.5 s of nothing

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.analysis.pose_errors import PoseErrors
-from app.analysis.trial import TrialTrace
+from app.analysis.trial import Snapped, TrialTrace
 
 NAN = float("nan")
 
@@ -15,6 +15,8 @@ def trial(
     rotation: Sequence[float] | None = None,
     stg_translation: Sequence[float] | None = None,
     stg_rotation: Sequence[float] | None = None,
+    paper_translation: Sequence[float] | None = None,
+    paper_rotation: Sequence[float] | None = None,
     operator: str = "P1",
     group: str = "novice",
     mode: str = "accurate",
@@ -46,6 +48,12 @@ def trial(
         active_seconds=np.maximum(0.0, seconds - idle_seconds),
         idle=(seconds > 0) & (seconds < idle_seconds),
         errors=errors(translation, rotation if rotation is not None else [0.0] * count),
-        stg_errors=errors(stg_translation, stg_rotation if stg_rotation is not None else stg_translation),
-        missing_snaps=0 if stg_translation is not None else count,
+        stg={
+            method: Snapped(errors(shifts, turns if turns is not None else shifts), np.ones(count, bool))
+            for method, shifts, turns in (
+                ("default", stg_translation, stg_rotation),
+                ("paper", paper_translation, paper_rotation),
+            )
+            if shifts is not None
+        },
     )

@@ -38,8 +38,11 @@ def test_a_report_tells_curves_and_all_that_is_read_off_them(url, reviewer):
     assert first["margin"] == pytest.approx(0.1) and first["seconds"] == 0.0 and first["operators"] == 2
     assert last["seconds"] == pytest.approx(6.0) and (last["low"], last["high"]) == (5.0, 7.0)
     assert last["registration_id"] is not None
-    assert cell["stg"]["points"][-1]["seconds"] is None and cell["stg"]["points"][-1]["share"] == 0.0
-    assert cell["hand_off"]["saved"] == pytest.approx(5.9)
+    assert (
+        cell["stg"]["default"]["points"][-1]["seconds"] is None
+        and cell["stg"]["default"]["points"][-1]["share"] == 0.0
+    )
+    assert cell["stg"]["default"]["hand_off"]["saved"] == pytest.approx(5.9)
     assert any("a snap worsens it; rotation error" in gain["sentence"] for gain in report["gains"])
     assert "group expert" in [remark["about"] for remark in report["remarks"]]
 
@@ -49,7 +52,7 @@ def test_a_part_can_be_asked_for(url, reviewer):
     assert [(one["mode"], one["error"]) for one in quick["cells"]] == [("quick", "rotation")]
     assert quick["choices"]["mode"] == ["accurate", "quick"]
     charged = reviewer.get(url, params={"snap_seconds": 2.0, "error": "translation"}).json()
-    assert charged["cells"][0]["stg"]["points"][0]["seconds"] == 2.0
+    assert charged["cells"][0]["stg"]["default"]["points"][0]["seconds"] == 2.0
 
 
 def test_files_are_served_and_are_the_same_bytes_each_time(url, reviewer):
