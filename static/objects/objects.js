@@ -143,8 +143,9 @@ function drawPresent() {
 
 function nothingText(suggestions) {
   if (item.suggestions_open) return "None, until somebody decides.";
+  if (item.symmetries_version > 1) return "None, as was decided.";
   if (suggestions === null) return "None. The mesh was never looked into: import the dataset again to have it done.";
-  return suggestions.length ? "None, as was decided." : "None, and none were found on the mesh.";
+  return "None, and none were found on the mesh.";
 }
 
 function presentRow(axis, index) {
