@@ -43,6 +43,6 @@ class Settings(BaseSettings):
         return self.state_dir / "files"
 
     @property
-    def cache_dir(self) -> Path:
-        """Where workers on this machine keep what they built of an object."""
-        return self.state_dir / "cache"
+    def prepared_dir(self) -> Path:
+        """Where what workers built of objects is kept."""
+        return self.state_dir / "prepared"

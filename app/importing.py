@@ -20,6 +20,7 @@ from app.symmetries import first_version, open_suggestions, suggest
 from app.tables import Dataset, Frame, Object, Scene, SymmetrySuggestions, Task
 from registration_core import ObjectModel, Symmetries
 from registration_core.bop import BopDataset, BopImage, BopObject, BopScene, read_dataset, read_depth
+from registration_core.viewpoint_model import check_visible
 
 Row = TypeVar("Row", Object, Scene, Frame, Task)
 Progress = Callable[[float, str], None]
@@ -91,6 +92,11 @@ def import_dataset(
     worlds = [world for scene in source.scenes for world in _worlds(scene, models)]
     if not worlds:
         raise DatasetImportError(f"{folder} has no scenes; a scene is a folder such as test/000001")
+    for item in source.objects:
+        try:
+            check_visible(item.model)
+        except ValueError as error:
+            raise DatasetImportError(f"models/{item.mesh_path.name}: {error}; replace the file") from error
     stored = _store(files, source)
     plain = {stored[o.mesh_path]: o.model for o in source.objects if o.model.symmetries == Symmetries()}
     report = partial(progress, 1.0, "looking for symmetries") if progress else lambda: None

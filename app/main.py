@@ -41,6 +41,7 @@ from app.event_log import EventLog
 from app.export_jobs import ExportJobs
 from app.labeling import proxy
 from app.labeling.desk import Desk
+from app.preparation import Preparation
 from app.replay import proxy as replay_proxy
 from app.replay.replays import Replays
 from app.scene_data import SceneData
@@ -72,6 +73,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         log=log,
         data=data,
         snapper=snapper,
+        preparation=Preparation(database, data, snapper),
         desk=Desk(database, log, data, snapper),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
@@ -86,6 +88,7 @@ def create_app(services: Services) -> FastAPI:
     @contextlib.asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         services.export_jobs.fail_interrupted()
+        services.preparation.start()
         cleaning = asyncio.create_task(_clean_up(services))
         async with httpx.AsyncClient() as client:
             app.state.http = client
@@ -141,11 +144,13 @@ async def _clean_up(services: Services) -> None:
         await asyncio.sleep(SECONDS_BETWEEN_CLEANINGS)
         await asyncio.to_thread(services.desk.close_idle)
         await asyncio.to_thread(services.replays.close_idle)
+        services.preparation.look()  # another program may have imported something
 
 
 def _close(services: Services) -> None:
     services.desk.close()
     services.replays.close()
     services.export_jobs.close()
+    services.preparation.close()
     services.snapper.close()
     services.database.close()

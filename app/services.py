@@ -9,6 +9,7 @@ from app.database import Database
 from app.event_log import EventLog
 from app.export_jobs import ExportJobs
 from app.labeling.desk import Desk
+from app.preparation import Preparation
 from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.snapping import Snapper
@@ -27,6 +28,7 @@ class Services:
     log: EventLog
     data: SceneData
     snapper: Snapper
+    preparation: Preparation
     desk: Desk
     replays: Replays
     export_jobs: ExportJobs

@@ -3,26 +3,30 @@
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as PlannedCall
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, TypeVar
 
 import dask
-from distributed import Client, Future, KilledWorker, LocalCluster, fire_and_forget
+from distributed import Client, Future, KilledWorker, LocalCluster
 
 from app import worker
 from app.clock import BOOT_ID
 from app.config import Settings
+from app.prepared import PreparedObjects
+from app.storage import PreparedStore
 from registration_core import ObjectModel
+from registration_core.algorithm import VIEWPOINT_ALGORITHM
 
 logger = logging.getLogger(__name__)
 
 
 DIED = "The worker died while it computed this. Nothing is lost; try again."
 UNREACHABLE = "The workers cannot be reached. Nothing is lost; try again."
+BACKGROUND = -1
+"""Priority of what nobody waits for, yet."""
 
 Result = TypeVar("Result")
 
@@ -47,6 +51,8 @@ class _Pending:
     future: Future | None = None
     begun: bool = False
     """A worker has told that it is at it, or was given the job for the second time."""
+    preparing: bool = False
+    """Its object is being built, or fetched."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,8 @@ class Standing:
     """How many snaps go before it; 0 once it runs."""
     seconds: float
     """How long it has waited or, once a worker is at it, has run."""
+    preparing: bool
+    """Whether it waits for its object, which is built once."""
 
 
 class Snapper:
@@ -67,13 +75,13 @@ class Snapper:
     Args:
         scheduler_address: A Dask scheduler; empty starts worker processes on this machine.
         workers: How many to start on this machine.
-        cache_dir: Where workers of this machine keep what they built of an object.
+        store: Where what they built of objects is kept.
     """
 
-    def __init__(self, scheduler_address: str, workers: int, cache_dir: Path) -> None:
+    def __init__(self, scheduler_address: str, workers: int, store: PreparedStore) -> None:
         self._scheduler_address = scheduler_address
         self._workers = workers
-        self._cache_dir = None if scheduler_address else cache_dir
+        self._objects = PreparedObjects(store, self._submit_build)
         self.topic = f"snap6d-{BOOT_ID}"
         """Where workers tell how far they are."""
         self._pending: dict[str, _Pending] = {}
@@ -106,7 +114,7 @@ class Snapper:
             if mine is None:
                 return None
             ahead = 0 if mine.running else sum(_goes_before(one, mine) for one in self._pending.values())
-        return Standing(workers, ahead, time.monotonic() - mine.since)
+        return Standing(workers, ahead, time.monotonic() - mine.since, mine.preparing)
 
     def request(
         self,
@@ -123,17 +131,29 @@ class Snapper:
         """
         with self._lock:
             self._pending[job.snap_id] = _Pending(job, model, on_progress, on_end, priority)
-        self._call(job.snap_id, self._submit, job.snap_id, False)
+        self._call(job.snap_id, self._submit, job.snap_id, None)
         return lambda: self._cancel(job.snap_id)
 
+    def built(self, model: ObjectModel, priority: int = BACKGROUND) -> PlannedCall[bytes]:
+        """What a worker builds of an object, once: see `PreparedObjects.get`."""
+        return self._objects.get(model, priority)
+
     def prepare(self, model: ObjectModel) -> None:
-        """Let every worker build what it needs of an object, soon and in the background."""
+        """Let every worker know an object, soon and in the background."""
         self._calls.submit(self._prepare, model)
+
+    def hand_over(self, model_hashes: Sequence[str]) -> None:
+        """Let every worker know objects that were built before; waits until they do."""
+        for model_hash in self._lacking(model_hashes):
+            content = self._objects.read(model_hash)
+            if content is not None:
+                self._send(model_hash, content)
 
     def close(self) -> None:
         """Stop the workers that were started here."""
         with self._lock:
             self._pending.clear()
+        self._objects.close()
         self._calls.shutdown(wait=True, cancel_futures=True)
         if self._client.done() and not self._client.cancelled() and self._client.exception() is None:
             self._client.result().close()
@@ -162,18 +182,17 @@ class Snapper:
         def report(call: PlannedCall[None]) -> None:
             error = None if call.cancelled() else call.exception()
             if error is not None:
-                logger.error("a snap could not be handed to the workers", exc_info=error)
-                self._end(snap_id, SnapError(UNREACHABLE))
+                self._end(snap_id, _failure(error))
 
         self._calls.submit(function, *args).add_done_callback(report)
 
-    def _submit(self, snap_id: str, with_model: bool) -> None:
+    def _submit(self, snap_id: str, content: bytes | None) -> None:
         pending = self._find(snap_id)
         if pending is None:
             return
-        model = pending.model if with_model else None
+        pending.preparing = False
         future = self._client.result().submit(
-            worker.run_job, pending.job, model, self._cache_dir, pure=False, priority=pending.priority
+            worker.run_job, pending.job, content, pure=False, priority=pending.priority
         )
         pending.future = future
         if self._find(snap_id) is None:  # cancelled in this moment
@@ -181,26 +200,32 @@ class Snapper:
             return
         future.add_done_callback(lambda done: self._on_done(snap_id, done))
 
+    def _submit_with_object(self, snap_id: str) -> None:
+        """Submit a job again, whose worker does not know the object."""
+        pending = self._find(snap_id)
+        if pending is None:
+            return
+        pending.preparing = True
+
+        def submit(built: PlannedCall[bytes]) -> None:
+            if self._find(snap_id) is not None:
+                self._call(snap_id, lambda: self._submit(snap_id, built.result()))
+
+        self.built(pending.model, pending.priority).add_done_callback(submit)
+
     def _on_done(self, snap_id: str, future: Future) -> None:
         if self._find(snap_id) is None:
             return
         try:
             result = future.result()
             if result is None:
-                self._call(snap_id, self._submit, snap_id, True)
+                self._call(snap_id, self._submit_with_object, snap_id)
             else:
                 self._end(snap_id, result)
-        except ValueError as error:
-            self._end(snap_id, SnapError(f"The snap cannot work on this: {error}."))
         except KilledWorker:
             self._on_killed(snap_id)
-        except (CancelledError, OSError):
-            self._end(snap_id, SnapError(UNREACHABLE))
-        except Exception:
-            logger.exception("a snap failed")
-            self._end(
-                snap_id, SnapError("The snap failed; the server's log says why. Nothing is lost; try again.")
-            )
+        except Exception as error:
+            self._end(snap_id, _failure(error))
 
     def _on_killed(self, snap_id: str) -> None:
         pending = self._find(snap_id)
@@ -210,7 +235,7 @@ class Snapper:
             self._end(snap_id, SnapError(DIED))
             return
         pending.begun = True  # it was handed to a worker that was dead already: that is not its fault
-        self._call(snap_id, self._submit, snap_id, False)
+        self._call(snap_id, self._submit, snap_id, None)
 
     def _on_report(self, event: tuple[float, dict[str, Any]]) -> None:
         _, report = event
@@ -244,19 +269,40 @@ class Snapper:
         client.run(worker.cancel, pending.job.snap_id)
         pending.future.cancel()
 
+    def _submit_build(self, model: ObjectModel, priority: int) -> Future:
+        return self._client.result().submit(worker.build, model, pure=False, priority=priority)
+
     def _prepare(self, model: ObjectModel) -> None:
-        client = self._client.result()
-        for address in client.scheduler_info(n_workers=-1)["workers"]:
-            future = client.submit(
-                worker.prepare, model, self._cache_dir, workers=[address], pure=False, priority=-1
-            )
-            future.add_done_callback(_log_failure)
-            fire_and_forget(future)
+        if not self._lacking([model.content_hash]):
+            return
+
+        def send(built: PlannedCall[bytes]) -> None:
+            error = built.exception()
+            if error is None:
+                self._calls.submit(self._send, model.content_hash, built.result())
+            elif not isinstance(error, CancelledError):
+                logger.warning("an object could not be prepared: %s", error)
+
+        self.built(model, 0).add_done_callback(send)
+
+    def _send(self, model_hash: str, content: bytes) -> None:
+        """Let the workers that do not know an object know it, whatever they are at."""
+        addresses = self._lacking([model_hash]).get(model_hash)
+        if addresses:
+            client = self._client.result()
+            client.run(worker.keep, model_hash, content, workers=addresses, on_error="ignore")
+
+    def _lacking(self, model_hashes: Sequence[str]) -> dict[str, list[str]]:
+        """The workers that do not know objects, by object."""
+        told = self._client.result().run(worker.lacking, list(model_hashes), on_error="ignore")
+        by_object = {one: [address for address in told if one in told[address]] for one in model_hashes}
+        return {model_hash: addresses for model_hash, addresses in by_object.items() if addresses}
 
 
 def create_snapper(settings: Settings) -> Snapper:
     """Start, or reach for, the workers that the settings ask for."""
-    return Snapper(settings.scheduler_address, settings.workers, settings.cache_dir.resolve())
+    store = PreparedStore(settings.prepared_dir.resolve(), VIEWPOINT_ALGORITHM)
+    return Snapper(settings.scheduler_address, settings.workers, store)
 
 
 def _goes_before(one: _Pending, other: _Pending) -> bool:
@@ -264,6 +310,13 @@ def _goes_before(one: _Pending, other: _Pending) -> bool:
     return not one.running and (-one.priority, one.since) < (-other.priority, other.since)
 
 
-def _log_failure(future: Future) -> None:
-    if future.status == "error":
-        logger.warning("an object could not be prepared: %s", future.exception())
+def _failure(error: BaseException) -> SnapError:
+    """What is told of a job that came to nothing."""
+    if isinstance(error, ValueError):
+        return SnapError(f"The snap cannot work on this: {error}.")
+    if isinstance(error, KilledWorker):
+        return SnapError(DIED)
+    if isinstance(error, CancelledError | OSError):
+        return SnapError(UNREACHABLE)
+    logger.error("a snap failed", exc_info=error)
+    return SnapError("The snap failed; the server's log says why. Nothing is lost; try again.")

@@ -1,4 +1,4 @@
-"""A content-addressed file store: a file's name is the hash of its content, so no request can name a path."""
+"""Files by hash, so that no request can name a path: of their own content, or of what they were made from."""
 
 import hashlib
 import os
@@ -46,6 +46,41 @@ class FileStore:
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(source, target)
         return digest
+
+
+class PreparedStore:
+    """What workers built of objects, by the hash of the object and that of what built it.
+
+    Args:
+        root: A folder; it need not be there yet.
+        algorithm: Of this version; what another one built counts as missing.
+    """
+
+    def __init__(self, root: Path, algorithm: str) -> None:
+        self._root = root
+        self._algorithm = algorithm
+
+    def read(self, model_hash: str) -> bytes | None:
+        """What was built of the object; None where nothing was, or it cannot be read."""
+        try:
+            return self._path(model_hash).read_bytes()
+        except OSError:
+            return None
+
+    def put(self, model_hash: str, content: bytes) -> None:
+        """Keep what was built of an object, whole on the disk when this returns, in the place of what another
+        algorithm built.
+        """
+        target = self._path(model_hash)
+        self._root.mkdir(parents=True, exist_ok=True)
+        _write_whole(target, content)
+        for path in self._root.glob(f"{model_hash}.*"):
+            if path != target:
+                path.unlink(missing_ok=True)
+
+    def _path(self, model_hash: str) -> Path:
+        assert HASH_PATTERN.fullmatch(model_hash)
+        return self._root / f"{model_hash}.{self._algorithm}"
 
 
 def _write_whole(target: Path, content: bytes) -> None:

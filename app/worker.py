@@ -1,17 +1,17 @@
 """What runs inside a worker process.
 
-A worker needs no shared files: a job brings the depth it looks at, and an object comes once and is kept. One
-on the application's own machine is told of a folder, too, for what it builds of an object and may need again.
+A worker needs no shared files: a job brings the depth it looks at, and what was built of an object comes once
+and is kept.
 """
 
 import platform
 import signal
+import threading
 import time
 from abc import ABC, abstractmethod
 from collections import OrderedDict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -29,12 +29,15 @@ from registration_core import (
     snap_steps,
 )
 from registration_core.compilation import warm_up
-from registration_core.viewpoint_model import viewpoint_model
+from registration_core.viewpoint_model import ViewpointModel, build_viewpoint_model, packed, unpacked
 
-KEPT_MODELS = 64
+KEPT_OBJECTS = 64
+"""Of about 4.5 MB."""
 SECONDS_BETWEEN_REPORTS = 0.05
 
-_models: OrderedDict[str, ObjectModel] = OrderedDict()
+_objects: OrderedDict[str, ViewpointModel] = OrderedDict()
+_lock = threading.Lock()
+"""Objects are handed over while jobs run."""
 _cancelled: deque[str] = deque(maxlen=1000)
 
 Result = TypeVar("Result")
@@ -62,7 +65,7 @@ class Job(ABC, Generic[Result]):
     config: SnapConfig
 
     @abstractmethod
-    def run(self, model: ObjectModel, tell: Tell) -> Result:
+    def run(self, known: ViewpointModel, tell: Tell) -> Result:
         """Do it; raises ValueError where the job is bad."""
 
 
@@ -85,12 +88,12 @@ class SnapJob(Job[JobResult]):
     explained: NDArray[np.bool_] | None = None
     """(H, W), the pixels of other objects whose pose is known; None where there are none."""
 
-    def run(self, model: ObjectModel, tell: Tell) -> JobResult:
+    def run(self, known: ViewpointModel, tell: Tell) -> JobResult:
         """See `registration_core.snap`."""
         estimate = None
         rng = np.random.default_rng(self.seed)
         for step in snap_steps(
-            model,
+            known,
             self.depth,
             self.camera,
             self.T_camera_object,
@@ -124,21 +127,20 @@ class SearchJob(Job[Proposals]):
     region: tuple[int, int, int, int] | None
     """(left, top, width, height) in pixels, where to look; everywhere where it is None."""
 
-    def run(self, model: ObjectModel, tell: Tell) -> Proposals:
+    def run(self, known: ViewpointModel, tell: Tell) -> Proposals:
         """See `registration_core.propose`, which cannot be stopped half-way but is soon done."""
         tell(0.0)
         started = time.perf_counter()
         rng = np.random.default_rng(self.seed)
-        found = propose(model, self.depth, self.camera, self.region, self.config, rng)
+        found = propose(known, self.depth, self.camera, self.region, self.config, rng)
         return Proposals(found, time.perf_counter() - started, ALGORITHM, hardware())
 
 
-def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None = None) -> Result | None:
+def run_job(job: Job[Result], content: bytes | None) -> Result | None:
     """Run one job, telling how far it is and stopping when it is cancelled.
 
     Args:
-        model: The object, where it has to be sent.
-        cache_dir: Where a worker, which may be the one before this, keeps what it built of objects.
+        content: What was built of the object, where it has to be sent.
 
     Returns:
         None where the object was not sent and is not known here: the job has to come again with it.
@@ -147,19 +149,31 @@ def run_job(job: Job[Result], model: ObjectModel | None, cache_dir: Path | None 
         SnapCancelledError: where `cancel` was called meanwhile.
         ValueError: where the job is bad.
     """
-    known = model or _models.get(job.model_hash)
+    if content is not None:
+        keep(job.model_hash, content)
+    known = _known(job.model_hash)
     if known is None:
         return None
     tell = _teller(job.snap_id, job.topic)
     tell(0.0)
-    prepare(known, cache_dir)
     return job.run(known, tell)
 
 
-def prepare(model: ObjectModel, cache_dir: Path | None) -> None:
-    """Build what a snap needs of an object before the first snap asks for it."""
-    _keep(model)
-    viewpoint_model(model, cache_dir)
+def build(model: ObjectModel) -> bytes:
+    """Build what a snap needs of an object; raises ValueError where it cannot be looked for."""
+    built = build_viewpoint_model(model)
+    _keep(model.content_hash, built)
+    return packed(built)
+
+
+def keep(model_hash: str, content: bytes) -> None:
+    """Know an object from now on by what was built of it, maybe elsewhere."""
+    _keep(model_hash, unpacked(content))
+
+
+def lacking(model_hashes: Sequence[str]) -> set[str]:
+    """Those of the objects that are not known here."""
+    return {model_hash for model_hash in model_hashes if model_hash not in _objects}
 
 
 def cancel(snap_id: str) -> None:
@@ -188,11 +202,19 @@ def _teller(snap_id: str, topic: str) -> Tell:
     return tell
 
 
-def _keep(model: ObjectModel) -> None:
-    _models[model.content_hash] = model
-    _models.move_to_end(model.content_hash)
-    while len(_models) > KEPT_MODELS:
-        _models.popitem(last=False)
+def _known(model_hash: str) -> ViewpointModel | None:
+    with _lock:
+        if model_hash in _objects:
+            _objects.move_to_end(model_hash)
+        return _objects.get(model_hash)
+
+
+def _keep(model_hash: str, built: ViewpointModel) -> None:
+    with _lock:
+        _objects[model_hash] = built
+        _objects.move_to_end(model_hash)
+        while len(_objects) > KEPT_OBJECTS:
+            _objects.popitem(last=False)
 
 
 def hardware() -> str:

@@ -52,9 +52,11 @@ class Operator:
         body = {"T_world_object": T_world_object.tolist()}
         await self.call("PUT", f"/api/registrations/{registration_id}/pose", body)
 
-    async def request_snap(self, registration_id: int, config: dict[str, Any] | None = None) -> str:
+    async def request_snap(
+        self, registration_id: int, config: dict[str, Any] | None = None, seed: int | None = None
+    ) -> str:
         """Press Snap; returns the snap's id."""
-        body = {"config": config or {}}
+        body = {"config": config or {}, "seed": seed}
         snap = await self.call("POST", f"/api/registrations/{registration_id}/snaps", body)
         return str(snap["id"])
 

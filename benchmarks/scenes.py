@@ -1,5 +1,6 @@
 """Scenes to measure on: the demo scenes' true poses, and frames in which every pixel has a depth."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from app.storage import FileStore
 from app.tables import Frame, Scene, Task
 from benchmarks.server import database_of, settings_of
 from registration_core import ObjectModel, bop_writer, pose
-from registration_core.procedural_objects import demo_objects
+from registration_core.procedural_objects import ProceduralObject, demo_objects
 from registration_core.rasterizer import render_depth
 from registration_core.synthetic_scene import CAMERA
 
@@ -23,6 +24,8 @@ DEPTH_SCALE = 0.1
 """Raw depth times this is millimetres."""
 START_TRANSLATION, START_ROTATION = 0.02, np.radians(15)
 """How far from the truth an operator leaves an object before a snap: metres and radians."""
+DENSE_FACES = 15_000
+"""As many as the meshes of scanned objects have."""
 WALL_DISTANCE, WALL_WAVES, NOISE = 0.9, 0.05, 0.001
 """Of the wall that fills a full frame, metres."""
 
@@ -73,12 +76,25 @@ def known_tasks(state_dir: Path) -> list[KnownTask]:
         ]
 
 
-def write_full_frames(folder: Path, frames: int) -> None:
+def dense_objects(count: int) -> tuple[ProceduralObject, ...]:
+    """The demo objects over and over, each of another size, with meshes as dense as those of scans."""
+    demo, made = demo_objects(), []
+    for number in range(count):
+        known = demo[number % len(demo)]
+        mesh = known.mesh.copy()
+        while len(mesh.faces) < DENSE_FACES:
+            mesh = mesh.subdivide()
+        mesh.apply_scale(1.0 + 0.02 * number)
+        made.append(ProceduralObject(f"{known.name} {number}", mesh, known.model.symmetries))
+    return tuple(made)
+
+
+def write_full_frames(folder: Path, frames: int, objects: Sequence[ProceduralObject] | None = None) -> None:
     """Write a BOP dataset of scenes with one image of 640x480 each, all of whose pixels have a depth.
 
-    In each stands another one of the demo objects before a wavy wall.
+    In each stands another one of the objects, of the demo scenes where none are given, before a wavy wall.
     """
-    objects = demo_objects()
+    objects = objects or demo_objects()
     rng = np.random.default_rng(0)
     infos = {}
     for obj_id, known in enumerate(objects, start=1):

@@ -9,6 +9,7 @@ import ast
 import hashlib
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 PACKAGE = "registration_core"
@@ -35,21 +36,30 @@ def algorithm_of(root: Path, entries: tuple[str, ...] = ENTRIES) -> str:
 def sources_hash(root: Path, entries: tuple[str, ...]) -> str:
     """The same of the modules alone."""
     digest = hashlib.sha256()
-    for name, tree in sorted(imported(root, entries).items()):
-        digest.update(f"{name}:{_written(tree)};".encode())
+    for name, written in sorted(imported(root, entries).items()):
+        digest.update(f"{name}:{written};".encode())
     return digest.hexdigest()[:DIGITS]
 
 
-def imported(root: Path, entries: tuple[str, ...]) -> dict[str, ast.Module]:
-    """The modules `entries` and all of the package that they import, directly or not, by dotted name."""
-    found: dict[str, ast.Module] = {}
+def imported(root: Path, entries: tuple[str, ...]) -> dict[str, str]:
+    """The modules `entries` and all of the package that they import, directly or not: what counts of their
+    sources, by dotted name.
+    """
+    found: dict[str, str] = {}
     ahead = list(entries)
     while ahead:
         name = ahead.pop()
         if name not in found and (path := _path(root, name)) is not None:
-            found[name] = ast.parse(path.read_bytes())
-            ahead += _imports(found[name])
+            found[name], imports = _read(path.read_bytes())
+            ahead += imports
     return found
+
+
+@cache
+def _read(source: bytes) -> tuple[str, tuple[str, ...]]:
+    """What counts of a module's source, and what it imports."""
+    tree = ast.parse(source)
+    return _written(tree), tuple(_imports(tree))
 
 
 def _path(root: Path, name: str) -> Path | None:
@@ -89,3 +99,6 @@ def _is_docstring(node: object) -> bool:
 
 ALGORITHM = algorithm_of(Path(__file__).parent)
 """Of this installation; 12 hexadecimal digits."""
+
+VIEWPOINT_ALGORITHM = sources_hash(Path(__file__).parent, ("viewpoint_model",))
+"""The same of what is built of an object before it is looked for, which changes less often."""

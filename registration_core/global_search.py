@@ -9,7 +9,6 @@ from registration_core.agreement import Prior, surface_of
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Hypothesis
 from registration_core.kernels import to_rows
-from registration_core.object_model import ObjectModel
 from registration_core.observation import FARTHEST, observe_region
 from registration_core.problem import Problem, checked_depth
 from registration_core.proposals import anywhere
@@ -17,7 +16,7 @@ from registration_core.search import Search, ranked
 from registration_core.seeding import seed_of
 from registration_core.snap_config import SnapConfig
 from registration_core.verdict import found_anywhere
-from registration_core.viewpoint_model import viewpoint_model
+from registration_core.viewpoint_model import Registrable, viewpoint_model
 
 MOST = 10
 """Hypotheses that are returned, at most."""
@@ -27,7 +26,7 @@ NO_PRIOR = np.float32(1e6)
 
 
 def propose(
-    model: ObjectModel,
+    model: Registrable,
     depth: ArrayLike,
     camera: Intrinsics,
     region: tuple[int, int, int, int] | None = None,

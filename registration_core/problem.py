@@ -10,10 +10,9 @@ from registration_core import pose
 from registration_core.agreement import Prior
 from registration_core.camera import Intrinsics
 from registration_core.kernels import Array32, centred, f4, from_rows, to_rows, uncentred
-from registration_core.object_model import ObjectModel
 from registration_core.observation import window
 from registration_core.snap_config import SnapConfig, SpreadConfig
-from registration_core.viewpoint_model import ViewpointModel, viewpoint_model
+from registration_core.viewpoint_model import Registrable, ViewpointModel, viewpoint_model
 
 Array = NDArray[np.float64]
 
@@ -69,7 +68,7 @@ class Problem:
 
 
 def checked_problem(
-    model: ObjectModel,
+    model: Registrable,
     depth: ArrayLike,
     camera: Intrinsics,
     T_camera_object: ArrayLike,
@@ -93,7 +92,7 @@ def checked_problem(
 
 
 def region_of_interest(
-    model: ObjectModel, camera: Intrinsics, T_camera_object: ArrayLike, config: SnapConfig
+    model: Registrable, camera: Intrinsics, T_camera_object: ArrayLike, config: SnapConfig
 ) -> tuple[int, int, int, int]:
     """(left, top, width, height) of the pixels that a snap from this pose may look at.
 

@@ -16,7 +16,6 @@ from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, SnapStep
 from registration_core.kernels import to_rows
 from registration_core.likelihood import RenderedLikelihood
-from registration_core.object_model import ObjectModel
 from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
 from registration_core.problem import checked_problem
 from registration_core.search import search_of
@@ -25,10 +24,11 @@ from registration_core.selection import is_settled
 from registration_core.snap_config import SnapConfig
 from registration_core.snap_run import Sighting, SnapRun
 from registration_core.verdict import certainty, judged, nothing_seen, outcome, progress, verdict
+from registration_core.viewpoint_model import Registrable
 
 
 def snap(
-    model: ObjectModel,
+    model: Registrable,
     depth: ArrayLike,
     camera: Intrinsics,
     T_camera_object: ArrayLike,
@@ -59,7 +59,7 @@ def snap(
 
 
 def snap_steps(
-    model: ObjectModel,
+    model: Registrable,
     depth: ArrayLike,
     camera: Intrinsics,
     T_camera_object: ArrayLike,

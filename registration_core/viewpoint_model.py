@@ -5,29 +5,21 @@ points just outside the silhouette; a pose hypothesis is then scored by looking 
 without rendering. The idea is that of sparse viewpoint models in region-based tracking (ICG, M3T).
 """
 
-import contextlib
-import logging
-import os
-import tempfile
+import io
 import threading
 import zipfile
 from collections import OrderedDict
 from dataclasses import dataclass, fields
-from pathlib import Path
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
+from registration_core.algorithm import VIEWPOINT_ALGORITHM
 from registration_core.kernels import Array32, f4
 from registration_core.mesh_reduction import clustered, decimated, is_closed, merged
 from registration_core.object_model import ObjectModel
 from registration_core.viewpoint_drawing import draw_views
-
-logger = logging.getLogger(__name__)
-
-VERSION = 2
-"""Part of the cache file's name: raised when the content of the model changes."""
 
 POINTS, RING_POINTS = 256, 64
 """Stored for each view."""
@@ -43,8 +35,12 @@ CLUSTER_CELLS = 200
 """Cells along the diameter to which a dense mesh is thinned first, which is fast, before it is decimated."""
 SYMMETRY_STEP = 0.1
 """Step of continuous symmetries, share of the diameter: fine enough to tell modes apart."""
+CHECK_SUBDIVISIONS = 1
+"""Of an icosahedron: 42 directions, by which it is told ahead whether a model can be built."""
+LEAST_SEEN = 0.5
+"""Share of the directions from which something of the mesh must be seen: flat ones pass, threads do not."""
 UNREADABLE = (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile)
-"""What reading a missing, damaged or outdated cache file may raise."""
+"""What reading damaged content may raise."""
 CACHED_MODELS = 64
 """Models kept in memory, about 5 MB each."""
 
@@ -82,14 +78,20 @@ class ViewpointModel:
     """(S, 3, 4), identity first, in the centred frame."""
 
 
-def viewpoint_model(model: ObjectModel, cache_dir: Path | None = None) -> ViewpointModel:
-    """The viewpoint model of an object, from memory, else from a file in `cache_dir`, else newly built."""
+Registrable = ObjectModel | ViewpointModel
+"""What is looked for: an object, or what was built of it before."""
+
+
+def viewpoint_model(model: Registrable) -> ViewpointModel:
+    """The viewpoint model of an object, built where it is not in memory."""
+    if isinstance(model, ViewpointModel):
+        return model
     key = model.content_hash
     with _lock:
         if key in _models:
             _models.move_to_end(key)
             return _models[key]
-    built = _load_or_build(model, cache_dir)
+    built = build_viewpoint_model(model)
     with _lock:
         _models[key] = built
         while len(_models) > CACHED_MODELS:
@@ -97,30 +99,56 @@ def viewpoint_model(model: ObjectModel, cache_dir: Path | None = None) -> Viewpo
     return built
 
 
+def packed(viewpoints: ViewpointModel) -> bytes:
+    """A viewpoint model as a file or a message holds it, about 4.5 MB; it hardly shrinks when compressed."""
+    content = io.BytesIO()
+    arrays = {field.name: getattr(viewpoints, field.name) for field in fields(viewpoints)}
+    np.savez(content, algorithm=VIEWPOINT_ALGORITHM, **arrays)
+    return content.getvalue()
+
+
+def unpacked(content: bytes) -> ViewpointModel:
+    """The inverse of `packed`.
+
+    Raises:
+        ValueError: where the content is damaged, or another algorithm made it.
+    """
+    try:
+        with np.load(io.BytesIO(content)) as arrays:
+            values = {name: arrays[name] for name in arrays.files}
+        if (algorithm := str(values.pop("algorithm"))) != VIEWPOINT_ALGORITHM:
+            raise ValueError(f"it was made by algorithm {algorithm}, and this is {VIEWPOINT_ALGORITHM}")
+        scalars = {name: float(values[name]) for name in ("diameter", "radius", "mean_area")}
+        closed = bool(values["coarse_is_closed"])
+        return ViewpointModel(**{**values, **scalars, "coarse_is_closed": closed})
+    except UNREADABLE as error:
+        raise ValueError(f"the viewpoint model cannot be read: {error}") from error
+
+
+def check_visible(model: ObjectModel) -> None:
+    """Raise a ValueError where `build_viewpoint_model` would, told in a few hundredths of its time."""
+    vertices = (model.vertices - model.centre).astype(np.float32)
+    faces = np.array(
+        model.faces, dtype=np.int32
+    )  # writable and in one piece, as the kernels are compiled for
+    _check_seen(_drawn(vertices, faces, _directions(CHECK_SUBDIVISIONS), model.radius, 1, 1)[3])
+
+
 def build_viewpoint_model(model: ObjectModel) -> ViewpointModel:
-    """The viewpoint model of an object; the mesh may be open, non-manifold, and wound either way."""
+    """The viewpoint model of an object; the mesh may be open, non-manifold, and wound either way.
+
+    Raises:
+        ValueError: where the mesh is too thin beside its extent to be seen from most sides.
+    """
     vertices = (model.vertices - model.centre).astype(np.float32)
     vertices, faces = merged(vertices, model.faces)
     if len(faces) > DENSE_FACES:
         vertices, faces = clustered(vertices, faces, model.diameter / CLUSTER_CELLS)
         vertices, faces = decimated(vertices, faces, DENSE_FACES)
     coarse_vertices, coarse_faces = decimated(vertices, faces, COARSE_FACES)
-    directions = np.asarray(trimesh.creation.icosphere(subdivisions=VIEW_SUBDIVISIONS).vertices)
-    views = len(directions)
-    points = np.zeros((views, 3, POINTS), np.float32)
-    normals = np.zeros((views, 3, POINTS), np.float32)
-    ring = np.zeros((views, 3, RING_POINTS), np.float32)
-    area = np.zeros(views, np.float32)
-    draw_views(
-        vertices.astype(np.float64),
-        faces,
-        _view_rotations(directions),
-        model.radius,
-        points,
-        normals,
-        ring,
-        area,
-    )
+    directions = _directions(VIEW_SUBDIVISIONS)
+    points, normals, ring, area = _drawn(vertices, faces, directions, model.radius, POINTS, RING_POINTS)
+    _check_seen(area)
     mean_area = float(area.mean())
     return ViewpointModel(
         centre=model.centre,
@@ -144,35 +172,38 @@ _models: OrderedDict[str, ViewpointModel] = OrderedDict()
 _lock = threading.Lock()
 
 
-def _load_or_build(model: ObjectModel, cache_dir: Path | None) -> ViewpointModel:
-    if cache_dir is None:
-        return build_viewpoint_model(model)
-    path = cache_dir / f"{model.content_hash}.v{VERSION}.npz"
-    with contextlib.suppress(*UNREADABLE):  # build it, or build it anew
-        return _read(path)
-    built = build_viewpoint_model(model)
-    try:
-        _write(path, built)
-    except OSError as error:  # a full disk costs time later, and no snap now
-        logger.warning("a viewpoint model could not be cached: %s", error)
-    return built
+def _directions(subdivisions: int) -> NDArray[np.float64]:
+    """Unit vectors (V, 3), evenly spread."""
+    return np.asarray(trimesh.creation.icosphere(subdivisions=subdivisions).vertices)
 
 
-def _read(path: Path) -> ViewpointModel:
-    with path.open("rb") as file, np.load(file) as arrays:
-        values = {name: arrays[name] for name in arrays.files}
-    scalars = {name: float(values[name]) for name in ("diameter", "radius", "mean_area")}
-    closed = bool(values["coarse_is_closed"])
-    return ViewpointModel(**{**values, **scalars, "coarse_is_closed": closed})
+def _drawn(
+    vertices: Array32,
+    faces: NDArray[np.int32],
+    directions: NDArray[np.float64],
+    radius: float,
+    points: int,
+    ring_points: int,
+) -> tuple[Array32, Array32, Array32, Array32]:
+    """Points (V, 3, points), their normals, ring points (V, 3, ring_points), and silhouette areas (V,) in
+    square metres.
+    """
+    views = len(directions)
+    found = np.zeros((views, 3, points), np.float32)
+    normals = np.zeros((views, 3, points), np.float32)
+    ring = np.zeros((views, 3, ring_points), np.float32)
+    area = np.zeros(views, np.float32)
+    rotations = _view_rotations(directions)
+    draw_views(vertices.astype(np.float64), faces, rotations, radius, found, normals, ring, area)
+    return found, normals, ring, area
 
 
-def _write(path: Path, viewpoints: ViewpointModel) -> None:
-    """Write beside the target and rename, so that another process never reads half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-        whole = Path(folder) / path.name
-        np.savez(whole, **{f.name: getattr(viewpoints, f.name) for f in fields(viewpoints)})
-        os.replace(whole, path)
+def _check_seen(area: Array32) -> None:
+    share = float((area > 0.0).mean())
+    if share < LEAST_SEEN:
+        raise ValueError(
+            f"mesh is too thin beside its extent to be looked for; it is seen from {share:.0%} of all sides"
+        )
 
 
 def _view_rotations(directions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from registration_core import pose
 from registration_core.camera import Intrinsics
 from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
-from registration_core.object_model import ObjectModel
 from registration_core.problem import OutOfViewError, Problem, checked_depth, checked_mask, checked_problem
 from registration_core.search import search_of
 from registration_core.seeding import seed_of
 from registration_core.snap import steps_of
 from registration_core.snap_config import SnapConfig
 from registration_core.snap_run import Sighting, SnapRun, Witness
+from registration_core.viewpoint_model import Registrable
 
 Array = NDArray[np.float64]
 View = tuple[ArrayLike, Intrinsics, ArrayLike]
@@ -26,7 +26,7 @@ View = tuple[ArrayLike, Intrinsics, ArrayLike]
 
 
 def snap_views(
-    model: ObjectModel,
+    model: Registrable,
     views: Sequence[View],
     T_world_object: ArrayLike,
     config: SnapConfig | None = None,
@@ -61,7 +61,7 @@ def snap_views(
 
 
 def snap_views_steps(
-    model: ObjectModel,
+    model: Registrable,
     views: Sequence[View],
     T_world_object: ArrayLike,
     config: SnapConfig | None = None,
@@ -125,7 +125,7 @@ def _checked(number: int, view: View, explained: ArrayLike | None) -> _CheckedVi
 
 
 def _problems(
-    model: ObjectModel,
+    model: Registrable,
     views: Sequence[_CheckedView],
     T_world_object: Array,
     config: SnapConfig,

@@ -3,6 +3,7 @@
 import shutil
 import tempfile
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 
 from fastapi import APIRouter, HTTPException, Request
@@ -59,6 +60,8 @@ class DatasetOut(BaseModel):
     name: str
     objects: int
     suggestions_open: int = Field(description="Objects whose suggested symmetries wait for a decision.")
+    objects_prepared: int = Field(description="Objects of which workers have built what snaps need.")
+    problems: list[str] = Field(description="Objects that cannot be snapped to, and why.")
     scenes: int
     tasks: int
     tasks_submitted: int
@@ -71,14 +74,14 @@ def list_datasets(
 ) -> Page:
     """All datasets."""
     with services.database.read() as session:
-        return page_of(session, select(Dataset), Dataset.id, after, limit, lambda row: _out(session, row))
+        return page_of(session, select(Dataset), Dataset.id, after, limit, partial(_out, services, session))
 
 
 @router.get("/{dataset_id}")
 def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -> DatasetOut:
     """One dataset."""
     with services.database.read() as session:
-        return _out(session, row_or_404(session, Dataset, dataset_id))
+        return _out(services, session, row_or_404(session, Dataset, dataset_id))
 
 
 @router.post("", status_code=201, openapi_extra={"requestBody": UPLOAD_BODY})
@@ -113,10 +116,11 @@ def _take_in(file: UploadFile, services: Services, identity: Identity) -> Datase
             summary = import_archive(services.database, services.files, archive, name, max_bytes)
         except ValueError as error:
             raise InputError(f"{error}.") from error
+    services.preparation.look()
     return get_dataset(summary.dataset_id, services, identity)
 
 
-def _out(session: Session, row: Dataset) -> DatasetOut:
+def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
     tasks = (
         select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id, ~Task.is_for_studies)
     )
@@ -126,12 +130,14 @@ def _out(session: Session, row: Dataset) -> DatasetOut:
         .join(Task.scene)
         .where(Scene.dataset_id == row.id, Registration.state == "submitted", OUTSIDE_STUDIES)
     )
-    objects = select(func.count(Object.id)).where(Object.dataset_id == row.id)
+    objects = session.scalars(select(Object).where(Object.dataset_id == row.id)).all()
     return DatasetOut(
         id=row.id,
         name=row.name,
-        objects=session.scalar(objects) or 0,
-        suggestions_open=session.scalar(objects.where(Object.suggestions_open)) or 0,
+        objects=len(objects),
+        suggestions_open=sum(item.suggestions_open for item in objects),
+        objects_prepared=sum(map(services.preparation.is_prepared, objects)),
+        problems=[problem for problem in map(services.preparation.problem, objects) if problem],
         scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
         tasks=session.scalar(tasks) or 0,
         tasks_submitted=session.scalar(submitted) or 0,

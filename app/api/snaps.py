@@ -119,6 +119,7 @@ class StandingOut(BaseModel):
     workers: int = Field(description="How many are there now.")
     ahead: int = Field(description="How many snaps go before it.")
     seconds: float = Field(description="How long it has waited or, once it runs, has run.")
+    preparing: bool = Field(description="Whether it waits for its object, which workers build once.")
 
 
 class SnapDetail(BaseModel):

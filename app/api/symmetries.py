@@ -97,6 +97,7 @@ def put_symmetries(object_id: Id, body: Decision, services: ServicesDep, identit
         except ValueError as error:
             raise InputError(f"body.{error}.") from error
     services.desk.renew_object(object_id)
+    services.preparation.look()
     return detail_of(services, _row(services, object_id))
 
 

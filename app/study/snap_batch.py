@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.worker import Job, Tell, hardware
-from registration_core import ALGORITHM, ObjectModel, snap_steps
+from registration_core import ALGORITHM, snap_steps
+from registration_core.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]
 
@@ -50,17 +51,17 @@ class SnapBatch(Job[BatchResult]):
 
     starts: tuple[BatchStart, ...]
 
-    def run(self, model: ObjectModel, tell: Tell) -> BatchResult:
+    def run(self, known: ViewpointModel, tell: Tell) -> BatchResult:
         """One after the other; one that fails leaves the others as they are."""
-        outcomes = tuple(self._outcome(model, number, tell) for number in range(len(self.starts)))
+        outcomes = tuple(self._outcome(known, number, tell) for number in range(len(self.starts)))
         return BatchResult(outcomes, ALGORITHM, hardware())
 
-    def _outcome(self, model: ObjectModel, number: int, tell: Tell) -> BatchOutcome:
+    def _outcome(self, known: ViewpointModel, number: int, tell: Tell) -> BatchOutcome:
         start = self.starts[number]
         began, rng = time.perf_counter(), np.random.default_rng(start.seed)
         estimate = None
         try:
-            for step in snap_steps(model, self.depth, self.camera, start.T_camera_object, self.config, rng):
+            for step in snap_steps(known, self.depth, self.camera, start.T_camera_object, self.config, rng):
                 tell((number + step.iteration / step.iterations) / len(self.starts))
                 estimate = step.estimate
         except ValueError as error:

@@ -1,8 +1,12 @@
 /** The datasets with their progress; pressing one shows only its tasks. */
 
 import { getAll } from "../api.js";
-import { byId, element, icon } from "../dom.js";
+import { byId, element, icon, setText } from "../dom.js";
 import { count } from "../format.js";
+
+const ASK_AGAIN_MS = 1000;
+
+let timer = null;
 
 /** Shows all datasets and returns them. `choose(id or null)` is called when one is pressed. */
 export async function showDatasets({ selected, choose, openImport }) {
@@ -22,7 +26,27 @@ export async function showDatasets({ selected, choose, openImport }) {
   press(selected);
   const cards = datasets.map((dataset, index) => element("div", {}, buttons[index], objectsLink(dataset)));
   byId("datasets").replaceChildren(...(cards.length ? cards : [nothingImported(openImport)]));
+  followPreparation(datasets);
   return datasets;
+}
+
+/** Tells how far workers are with what snaps need of the objects, until they are done. */
+function followPreparation(datasets) {
+  clearTimeout(timer);
+  for (const { id, ...dataset } of datasets) {
+    const note = document.querySelector(`[data-dataset-id="${id}"] .dataset-preparation`);
+    if (note) setText(note, preparationText(dataset));
+  }
+  if (!datasets.some(isPreparing)) return;
+  timer = setTimeout(async () => followPreparation(await getAll("/api/datasets").catch(() => datasets)), ASK_AGAIN_MS);
+}
+
+const isPreparing = ({ objects, objects_prepared: prepared, problems }) => prepared + problems.length < objects;
+
+function preparationText(dataset) {
+  const { objects, objects_prepared: prepared, problems } = dataset;
+  const doing = isPreparing(dataset) ? [`Preparing objects for snaps: ${prepared} of ${objects} done.`] : [];
+  return [...doing, ...problems].join(" ");
 }
 
 function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted }) {
@@ -37,6 +61,7 @@ function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted }) 
     ),
     element("progress", { className: "human", max: most, value: submitted, "aria-label": "Submitted" }),
     element("small", {}, count(scenes, "scene")),
+    element("small", { className: "dataset-preparation", role: "status" }),
   );
   return button;
 }

@@ -6,6 +6,7 @@ import { byId, setText } from "../dom.js";
 const PATIENCE_MS = 2000;
 const ASK_AGAIN_MS = 1000;
 const LONG_SECONDS = { default: 10, paper: 60 };
+const PREPARING = "This object is being prepared for snaps, which happens once.";
 const NO_WORKER = "No worker is there; Snap works again when one is up. You can go on by hand.";
 const SLOW = "The worker takes long. You can go on by hand, or cancel.";
 
@@ -60,8 +61,9 @@ function tell(id, text, seconds) {
   setText(byId("snap-seconds"), seconds);
 }
 
-function textFor({ state, method, standing: { workers, ahead, seconds } }) {
+function textFor({ state, method, standing: { workers, ahead, seconds, preparing } }) {
   if (state === "running") return seconds < LONG_SECONDS[method] ? snappingText({ method }) : SLOW;
   if (workers === 0) return NO_WORKER;
+  if (preparing) return PREPARING;
   return `All workers are busy; ${ahead === 0 ? "yours is next" : `${ahead} before you`}.`;
 }

@@ -29,7 +29,7 @@ def test_the_database_lies_in_the_state_directory_unless_told(tmp_path, monkeypa
     assert relative.resolved_database_url == f"sqlite:///{tmp_path / 'here' / 'snap6d.sqlite'}"
     told = Settings(state_dir=tmp_path, database_url="postgresql+psycopg://db/snap6d")
     assert told.resolved_database_url == "postgresql+psycopg://db/snap6d"
-    assert told.files_dir == tmp_path / "files" and told.cache_dir == tmp_path / "cache"
+    assert told.files_dir == tmp_path / "files" and told.prepared_dir == tmp_path / "prepared"
 
 
 @pytest.mark.parametrize(

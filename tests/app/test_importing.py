@@ -225,6 +225,11 @@ NAN_MESH = (
     PLY.format(n=3)
     + "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\nnan 0 50\n0 50 0\n3 0 1 2\n"
 )
+THREAD_MESH = (
+    PLY.format(n=3)
+    + "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    + "0 0 0\n120 0 0\n60 0.001 0\n3 0 1 2\n"
+)
 CAMERAS, TRUTHS = f"{POSED_SCENE}/scene_camera.json", f"{POSED_SCENE}/scene_gt.json"
 
 UNSOUND: dict[str, tuple[Callable[[Path], object], list[str]]] = {
@@ -255,6 +260,10 @@ UNSOUND: dict[str, tuple[Callable[[Path], object], list[str]]] = {
     "a NaN in a mesh": (
         lambda root: (root / MESH_OF_TOOL).write_text(NAN_MESH),
         [MESH_OF_TOOL, "NaN", "replace the file"],
+    ),
+    "a mesh that is nearly a line": (
+        lambda root: (root / MESH_OF_TOOL).write_text(THREAD_MESH),
+        [MESH_OF_TOOL, "too thin beside its extent", "replace the file"],
     ),
     "a mesh in metres": (
         lambda root: rescale(root / MESH_OF_TOOL, 0.001),

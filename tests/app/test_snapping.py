@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from app.snapping import DIED, UNREACHABLE, SnapError, Snapper
+from app.storage import PreparedStore
 from app.worker import JobResult, SnapJob
 from registration_core import ObjectModel, SnapConfig, region_of_interest
+from registration_core.algorithm import VIEWPOINT_ALGORITHM
 from tests.app.export.site import CAMERA
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import (
@@ -30,9 +32,13 @@ from tests.app.waiting import LONGEST, wait_until
 SLOW = SnapConfig.from_dict(SLOW_SNAP)
 
 
+def store_in(folder: Path) -> PreparedStore:
+    return PreparedStore(folder, VIEWPOINT_ALGORITHM)
+
+
 @pytest.fixture(scope="module")
 def snapper(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Snapper]:
-    started = Snapper("", 2, tmp_path_factory.mktemp("cache"))
+    started = Snapper("", 2, store_in(tmp_path_factory.mktemp("prepared")))
     started.wait_until_ready()
     yield started
     workers = pids(started)
@@ -79,7 +85,7 @@ def knowing(snapper: Snapper, digest: str) -> int:
     def knows() -> bool:
         from app import worker
 
-        return digest in worker._models
+        return digest in worker._objects
 
     return sum(snapper._client.result().run(knows).values())
 
@@ -93,9 +99,9 @@ def forbid_building(snapper: Snapper) -> None:
     """Let every worker fail that builds what it needs of an object."""
 
     def forbid() -> None:
-        from registration_core import viewpoint_model
+        from app import worker
 
-        viewpoint_model.build_viewpoint_model = None
+        worker.build_viewpoint_model = None
 
     snapper._client.result().run(forbid)
 
@@ -161,7 +167,7 @@ def test_cancelling_one_of_many_lets_the_next_begin(snapper, model):
 
 
 def test_of_those_that_wait_for_a_worker_the_urgent_goes_first(tmp_path, model):
-    with closing(Snapper("", 1, tmp_path)) as alone:
+    with closing(Snapper("", 1, store_in(tmp_path))) as alone:
         alone.wait_until_ready()
         check_that_the_urgent_goes_first(alone, model)
 
@@ -208,12 +214,27 @@ def test_it_is_known_how_a_snap_stands(snapper, model):
     assert all(snapper.standing(snap_id).ahead == 0 for snap_id in ids[:2])
 
 
+def test_a_snap_that_waits_for_its_object_says_so(snapper, model):
+    held = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
+    assert all(outcome.moved.wait(LONGEST) for outcome, _ in held)
+    unknown = new_model()
+    built = snapper.built(unknown)  # which waits for a worker
+    outcome, _ = request(snapper, job := new_job(unknown, snapper.topic), unknown)
+    assert not snapper.standing(job.snap_id).preparing
+    snapper._call(job.snap_id, snapper._submit_with_object, job.snap_id)  # as if it came back from a worker
+    wait_until(lambda: snapper.standing(job.snap_id).preparing, "the snap to wait for its object")
+    assert snapper.built(unknown) is built
+    for _, cancel in held:
+        cancel()
+    assert isinstance(result_of(outcome), JobResult) and built.done()
+
+
 def test_an_object_that_no_worker_knows_is_sent_along(snapper):
     unknown = new_model()
     assert knowing(snapper, unknown.content_hash) == 0
     outcome, _ = request(snapper, new_job(unknown, snapper.topic), unknown)
     assert isinstance(result_of(outcome), JobResult)
-    assert knowing(snapper, unknown.content_hash) == 1
+    assert knowing(snapper, unknown.content_hash) in (1, 2)  # the one that built it, and the one that snapped
 
 
 def test_a_prepared_object_is_with_every_worker(snapper):
@@ -253,41 +274,36 @@ def test_a_worker_that_dies_in_mid_snap_fails_that_snap_only(snapper, model):
     wait_until(lambda: snapper.worker_count() == 2, "another worker in its place")
 
 
-def test_a_restarted_worker_reads_what_the_one_before_it_built(tmp_path):
+def test_what_was_built_is_never_built_again(tmp_path):
     model = new_model()
-    alone = Snapper("", 1, tmp_path)
-    try:
-        alone.prepare(model)
-        wait_until(lambda: knowing(alone, model.content_hash) == 1, "the worker to be prepared")
-        wait_until(lambda: busy(alone) == 0, "the worker to be idle")
-        (address,) = addresses(alone)
-        os.kill(*pids(alone), signal.SIGKILL)
-        wait_until(lambda: addresses(alone) not in ([], [address]), "another worker in its place")
-        assert knowing(alone, model.content_hash) == 0
-        forbid_building(alone)
-        outcome, _ = request(alone, new_job(model, alone.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
+    with closing(Snapper("", 1, store_in(tmp_path))) as first:
+        first.built(model).result(LONGEST)
+        assert knowing(first, model.content_hash) == 1
+    with closing(Snapper("", 1, store_in(tmp_path))) as second:
+        second.wait_until_ready()
+        forbid_building(second)
+        outcome, _ = request(second, new_job(model, second.topic), model)
+        assert_same(result_of(outcome).estimate, done_here(new_job(model), model))
         other = new_model()
-        outcome, _ = request(alone, new_job(other, alone.topic), other)
+        outcome, _ = request(second, new_job(other, second.topic), other)
         assert isinstance(result_of(outcome), SnapError)  # so building was forbidden indeed
-    finally:
-        alone.close()
 
 
-def test_workers_of_a_cluster_need_no_folder(cluster, tmp_path):
-    elsewhere, model = Snapper(cluster, 1, tmp_path), new_model()
-    outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
-    assert isinstance(result_of(outcome), JobResult)
-    elsewhere.prepare(other := new_model())
-    wait_until(lambda: knowing(elsewhere, other.content_hash) == 2, "the workers to be prepared")
-    wait_until(lambda: busy(elsewhere) == 0, "the workers to be idle")
-    elsewhere.close()
-    assert list(tmp_path.iterdir()) == []
+def test_workers_of_a_cluster_get_what_one_of_them_built(cluster, tmp_path):
+    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
+        model, other = new_model(), new_model()
+        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
+        assert isinstance(result_of(outcome), JobResult)
+        assert knowing(elsewhere, model.content_hash) in (1, 2)
+        elsewhere.hand_over([model.content_hash, other.content_hash])
+        assert knowing(elsewhere, model.content_hash) == 2 and knowing(elsewhere, other.content_hash) == 0
+        elsewhere.prepare(other)
+        wait_until(lambda: knowing(elsewhere, other.content_hash) == 2, "the workers to be prepared")
 
 
 def test_without_a_scheduler_a_snap_says_so(model, tmp_path):
     with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
-        alone = Snapper("tcp://127.0.0.1:1", 1, tmp_path)
+        alone = Snapper("tcp://127.0.0.1:1", 1, store_in(tmp_path))
         with pytest.raises(OSError, match="Timed out"):
             alone.wait_until_ready()
     assert alone.worker_count() == 0

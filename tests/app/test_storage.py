@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.storage import FileStore
+from app.storage import FileStore, PreparedStore
 
 
 def stored(files: FileStore) -> list[Path]:
@@ -68,3 +68,24 @@ def test_many_at_once_put_the_same_content(files):
         thread.join()
     (path,) = stored(files)
     assert path.read_bytes() == content
+
+
+OBJECT, OTHER = "ab" * 32, "cd" * 32
+
+
+def test_what_was_built_is_kept_by_object_and_algorithm(tmp_path):
+    old, new = (PreparedStore(tmp_path / "prepared", algorithm) for algorithm in ("old", "new"))
+    assert old.read(OBJECT) is None
+    old.put(OBJECT, b"built")
+    old.put(OTHER, b"another")
+    assert old.read(OBJECT) == b"built" and new.read(OBJECT) is None
+    new.put(OBJECT, b"better")
+    assert new.read(OBJECT) == b"better"
+    assert old.read(OBJECT) is None and old.read(OTHER) == b"another"  # the old one goes when it is replaced
+    new.put(OBJECT, b"again")
+    assert new.read(OBJECT) == b"again" and len(list((tmp_path / "prepared").iterdir())) == 2
+
+
+def test_what_was_built_is_named_by_hashes_alone(tmp_path):
+    with pytest.raises(AssertionError):
+        PreparedStore(tmp_path, "new").read("../secret")

@@ -11,6 +11,7 @@ from distributed import Client
 from app import worker
 from app.worker import SearchJob, SnapCancelledError
 from registration_core import ObjectModel, SnapConfig, propose
+from registration_core.viewpoint_model import packed, viewpoint_model
 from tests.app.export.site import CAMERA
 from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
 from tests.app.waiting import LONGEST, wait_until
@@ -32,6 +33,12 @@ def model() -> ObjectModel:
     return new_model()
 
 
+@pytest.fixture
+def content(model: ObjectModel) -> bytes:
+    """What a worker builds of the model."""
+    return packed(viewpoint_model(model))
+
+
 def run(client: Client, address: str, function: Any, *arguments: Any) -> Any:
     return client.submit(function, *arguments, workers=[address], pure=False).result(LONGEST)
 
@@ -44,65 +51,69 @@ def run(client: Client, address: str, function: Any, *arguments: Any) -> Any:
     ],
     ids=["fast", "paper"],
 )
-def test_it_finds_what_the_library_finds(client, addresses, model, config):
+def test_it_finds_what_the_library_finds(client, addresses, model, content, config):
     job = new_job(model, config=config)
-    result = run(client, addresses[0], worker.run_job, job, model)
+    result = run(client, addresses[0], worker.run_job, job, content)
     assert_same(result.estimate, done_here(job, model))
     assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
     assert result.hardware
 
 
-def test_it_passes_by_what_it_is_told_of(client, addresses, model):
+def test_it_passes_by_what_it_is_told_of(client, addresses, model, content):
     job = new_job(model, explained=np.ones(DEPTH.shape, dtype=np.bool_))
-    result = run(client, addresses[0], worker.run_job, job, model)
+    result = run(client, addresses[0], worker.run_job, job, content)
     assert np.allclose(result.estimate.T_camera_object, job.T_camera_object)
     assert not result.estimate.converged
 
 
 @pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])
-def test_it_searches_as_far_as_it_is_told(client, addresses, model, method):
+def test_it_searches_as_far_as_it_is_told(client, addresses, model, content, method):
     config = SnapConfig.from_dict({"method": method, "particle_filter": {"particles": 60, "iterations": 20}})
     found = []
     for spread in (None, (0.006, 0.1), (0.06, 1.0)):
         job = new_job(model, config=config, start_spread=spread)
-        result = run(client, addresses[0], worker.run_job, job, model)
+        result = run(client, addresses[0], worker.run_job, job, content)
         assert_same(result.estimate, done_here(job, model))
         found.append(result.estimate.confidence)
     assert len(set(found)) == 3
 
 
-def test_a_search_finds_what_the_library_finds(client, addresses, model):
+def test_a_search_finds_what_the_library_finds(client, addresses, model, content):
     job = SearchJob("a search", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, (0, 0, 400, 300))
-    found = run(client, addresses[0], worker.run_job, job, model)
+    found = run(client, addresses[0], worker.run_job, job, content)
     here = propose(model, DEPTH, CAMERA, job.region, job.config, np.random.default_rng(job.seed))
     assert found.hypotheses and found.seconds > 0 and found.hardware
     for one, other in zip(found.hypotheses, here, strict=True):
         assert np.array_equal(one.T_camera_object, other.T_camera_object) and one.weight == other.weight
 
 
-def test_a_search_cancelled_before_it_comes_does_not_run(client, addresses, model):
+def test_a_search_cancelled_before_it_comes_does_not_run(client, addresses, model, content):
     job = SearchJob("left", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, None)
     client.run(worker.cancel, job.snap_id)
     with pytest.raises(SnapCancelledError):
-        run(client, addresses[0], worker.run_job, job, model)
+        run(client, addresses[0], worker.run_job, job, content)
 
 
-def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model):
+def test_an_object_comes_once_and_is_kept_by_that_worker(client, addresses, model, content):
     here, there = addresses
     assert run(client, here, worker.run_job, new_job(model), None) is None
-    assert run(client, here, worker.run_job, new_job(model), model) is not None
+    assert run(client, here, worker.run_job, new_job(model), content) is not None
     assert run(client, here, worker.run_job, new_job(model), None) is not None
     assert run(client, there, worker.run_job, new_job(model), None) is None
 
 
-def test_a_prepared_object_need_not_be_sent(client, addresses, model, tmp_path):
-    run(client, addresses[1], worker.prepare, model, tmp_path)
-    assert any(tmp_path.rglob("*.npz"))
-    assert run(client, addresses[1], worker.run_job, new_job(model), None) is not None
-    run(client, addresses[0], worker.prepare, new_model(), None)
+def test_what_a_worker_builds_serves_all(client, addresses, model):
+    here, there = addresses
+    built = run(client, here, worker.build, model)
+    lacking = client.run(worker.lacking, [model.content_hash])
+    assert lacking == {here: set(), there: {model.content_hash}}
+    client.run(worker.keep, model.content_hash, built, workers=[there])
+    for address in addresses:
+        result = run(client, address, worker.run_job, new_job(model), None)
+        assert_same(result.estimate, done_here(new_job(model), model))
 
 
-def test_progress_is_told_by_snap(client, addresses, model):
+def test_progress_is_told_by_snap(client, addresses, model, content):
     told: list[dict[str, Any]] = []
     topic = f"progress of {model.content_hash}"
     client.subscribe_topic(topic, lambda event: told.append(event[1]))
@@ -110,7 +121,7 @@ def test_progress_is_told_by_snap(client, addresses, model):
         {"preset": "paper", "particle_filter": {"particles": 60, "iterations": 300}}
     )
     job = new_job(model, topic, config)
-    run(client, addresses[0], worker.run_job, job, model)
+    run(client, addresses[0], worker.run_job, job, content)
     wait_until(lambda: told, "progress")
     client.unsubscribe_topic(topic)
     assert {report["snap_id"] for report in told} == {job.snap_id}
@@ -118,30 +129,32 @@ def test_progress_is_told_by_snap(client, addresses, model):
     assert shares == sorted(shares) and shares[0] == 0 < shares[-1] <= 1
 
 
-def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model):
+def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model, content):
     job = new_job(model)
     client.run(worker.cancel, job.snap_id)
     with pytest.raises(SnapCancelledError):
-        run(client, addresses[0], worker.run_job, job, model)
+        run(client, addresses[0], worker.run_job, job, content)
 
 
-def test_a_bad_job_is_refused_by_name(client, addresses, model):
+def test_a_bad_job_is_refused_by_name(client, addresses, model, content):
     far = T_CAMERA_TOOL.copy()
     far[:3, 3] = [50.0, 0.0, 1.0]
     with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
-        run(client, addresses[0], worker.run_job, new_job(model, T_camera_object=far), model)
+        run(client, addresses[0], worker.run_job, new_job(model, T_camera_object=far), content)
     with pytest.raises(ValueError, match="start_spread must be"):
-        run(client, addresses[0], worker.run_job, new_job(model, start_spread=(-1.0, 0.1)), model)
+        run(client, addresses[0], worker.run_job, new_job(model, start_spread=(-1.0, 0.1)), content)
 
 
-def test_only_the_recent_objects_are_kept(monkeypatch):
-    monkeypatch.setattr(worker, "_models", type(worker._models)())
-    monkeypatch.setattr(worker, "KEPT_MODELS", 2)
+def test_only_the_recent_objects_are_kept(monkeypatch, content):
+    monkeypatch.setattr(worker, "_objects", type(worker._objects)())
+    monkeypatch.setattr(worker, "KEPT_OBJECTS", 2)
     models = [new_model() for _ in range(3)]
-    for kept in models:
-        worker.prepare(kept, None)
-    assert list(worker._models) == [kept.content_hash for kept in models[1:]]
-    assert worker.run_job(new_job(models[0]), None) is None
+    for one in models[:2]:
+        worker.keep(one.content_hash, content)
+    assert worker.run_job(new_job(models[0]), None) is not None  # and so is used the latest
+    worker.keep(models[2].content_hash, content)
+    assert list(worker._objects) == [models[0].content_hash, models[2].content_hash]
+    assert worker.run_job(new_job(models[1]), None) is None
 
 
 def test_the_module_is_a_dask_preload(client):

@@ -64,3 +64,16 @@ def test_it_is_told_what_a_snap_waits_for(
     take_picture(page, "label-all-workers-busy")
     assert page.request.delete(f"{server.url}/api/snaps/{ann.state['snap']['id']}").ok
     other.events("snap_applied")
+
+
+def test_the_list_of_tasks_tells_how_far_objects_are_prepared(
+    server: Server, cluster: LocalCluster, open_page: Callable[[str], Page]
+) -> None:
+    page = open_page(server.sign_in_link)
+    note = page.locator(".dataset-preparation")
+    expect(note).to_have_text("Preparing objects for snaps: 0 of 5 done.")
+    take_picture(page, "home-preparing")
+    cluster.scale(1)
+    expect(note).to_be_hidden(timeout=3 * SLOWEST)  # it builds five objects
+    (dataset,) = page.request.get(f"{server.url}/api/datasets").json()["items"]
+    assert (dataset["objects_prepared"], dataset["problems"]) == (5, [])

@@ -1,17 +1,24 @@
 """Stored points lie on the object, face the view, and rings lie outside the outline."""
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from registration_core import ObjectModel
+from registration_core import ObjectModel, SnapConfig, pose, region_of_interest, snap
 from registration_core import viewpoint_model as module
 from registration_core.kernels import view_of
 from registration_core.object_model import discrete
-from registration_core.viewpoint_model import build_viewpoint_model, viewpoint_model
-from tests.registration_core.simple_scene import tool
+from registration_core.viewpoint_model import (
+    build_viewpoint_model,
+    check_visible,
+    packed,
+    unpacked,
+    viewpoint_model,
+)
+from tests.registration_core.simple_scene import standing_tool, tool
 
 RADIUS = 0.06
 
@@ -102,43 +109,65 @@ def test_symmetries_are_about_the_centre() -> None:
     np.testing.assert_allclose(built.symmetries[1], np.diag([-1.0, -1.0, 1.0, 1.0])[:3], atol=1e-6)
 
 
-def test_is_built_once_and_read_back_from_its_file(tmp_path, monkeypatch) -> None:
+def test_is_built_once(monkeypatch) -> None:
     model = tool()
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    first = viewpoint_model(model, tmp_path)
+    first = viewpoint_model(model)
+    monkeypatch.setattr(module, "build_viewpoint_model", None)
     assert viewpoint_model(model) is first
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    monkeypatch.setattr(module, "build_viewpoint_model", None)
-    again = viewpoint_model(model, tmp_path)
-    assert again is not first
-    np.testing.assert_array_equal(again.points, first.points)
-    assert again.diameter == first.diameter
-    assert [path.suffix for path in tmp_path.iterdir()] == [".npz"]
+    assert viewpoint_model(first) is first
 
 
-def test_what_cannot_be_written_is_built_all_the_same(tmp_path, monkeypatch) -> None:
-    warnings = []
-
-    def fail(*_: object) -> None:
-        raise OSError("the disk is full")
-
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    monkeypatch.setattr(module.os, "replace", fail)
-    monkeypatch.setattr(module.logger, "warning", lambda text, *values: warnings.append(text % values))
-    model = tool()
-    assert viewpoint_model(model, tmp_path).diameter == model.diameter
-    assert len(warnings) == 1 and "could not be cached: the disk is full" in warnings[0]
-    assert list(tmp_path.iterdir()) == []
+def test_what_was_packed_comes_back_to_the_last_bit() -> None:
+    built = viewpoint_model(tool())
+    again = unpacked(packed(built))
+    for field in fields(built):
+        assert np.array_equal(getattr(again, field.name), getattr(built, field.name))
+        assert type(getattr(again, field.name)) is type(getattr(built, field.name))
 
 
-def test_a_damaged_file_is_built_anew(tmp_path, monkeypatch) -> None:
-    model = tool()
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    first = viewpoint_model(model, tmp_path)
-    (file,) = tmp_path.iterdir()
-    file.write_bytes(file.read_bytes()[:1000])
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    np.testing.assert_array_equal(viewpoint_model(model, tmp_path).points, first.points)
-    monkeypatch.setattr(module, "_models", type(module._models)())
-    monkeypatch.setattr(module, "build_viewpoint_model", None)
-    np.testing.assert_array_equal(viewpoint_model(model, tmp_path).points, first.points)
+def test_a_snap_with_what_was_built_is_that_with_the_object() -> None:
+    scene = standing_tool()
+    start = pose.perturbed(scene.truth, 0.02, 0.2, np.random.default_rng(0))
+    known = unpacked(packed(build_viewpoint_model(scene.model)))
+    one, other = (
+        snap(model, scene.depth, scene.camera, start, rng=np.random.default_rng(1))
+        for model in (scene.model, known)
+    )
+    assert np.array_equal(one.T_camera_object, other.T_camera_object) and one.confidence == other.confidence
+    config = SnapConfig()
+    assert region_of_interest(known, scene.camera, start, config) == region_of_interest(
+        scene.model, scene.camera, start, config
+    )
+
+
+def test_what_is_damaged_or_of_another_algorithm_is_refused(monkeypatch) -> None:
+    content = packed(viewpoint_model(tool()))
+    for damaged in (b"", content[:1000], content[:-1000], b"x" * 1000):
+        with pytest.raises(ValueError, match="cannot be read"):
+            unpacked(damaged)
+    monkeypatch.setattr(module, "VIEWPOINT_ALGORITHM", "0123456789ab")
+    with pytest.raises(ValueError, match=r"it was made by algorithm \w{12}, and this is 0123456789ab"):
+        unpacked(content)
+
+
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        [[0, 0, 0], [0.2, 0, 0], [0.1, 1e-6, 0]],
+        [[0, 0, 0], [1e-9, 0, 0], [0, 1e-9, 0], [0.1, 0, 0]],
+    ],
+    ids=["a thread", "a speck beside a stray vertex"],
+)
+def test_a_mesh_that_cannot_be_seen_is_refused_ahead_and_when_built(vertices) -> None:
+    model = ObjectModel(np.array(vertices, dtype=np.float64), np.array([[0, 1, 2]], dtype=np.int32))
+    for refuse in (check_visible, build_viewpoint_model):
+        with pytest.raises(
+            ValueError, match="mesh is too thin beside its extent to be looked for; it is seen"
+        ):
+            refuse(model)
+
+
+def test_flat_and_ordinary_meshes_can_be_seen() -> None:
+    triangle = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], dtype=np.float64)
+    check_visible(ObjectModel(triangle, np.array([[0, 1, 2]], dtype=np.int32)))
+    check_visible(tool())

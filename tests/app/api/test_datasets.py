@@ -14,7 +14,7 @@ from sqlalchemy import text
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 from tests.app.small_dataset import POSED_SCENE, UNPOSED_SCENE, change_json
-from tests.app.waiting import LONGEST
+from tests.app.waiting import LONGEST, wait_until
 
 TABLES = ("datasets", "objects", "scenes", "frames", "tasks")
 MEGABYTE = 2**20
@@ -48,9 +48,15 @@ def rows_of(server: LiveServer) -> dict[str, list]:
 
 
 def files_of(server: LiveServer) -> set[Path]:
-    """All files of the state directory, but for those that SQLite keeps beside its own."""
-    state_dir = server.services.settings.state_dir
-    return {path for path in state_dir.rglob("*") if not path.name.startswith("snap6d.sqlite")}
+    """All files of the state directory, but for what workers build of objects and for those that SQLite keeps
+    beside its own.
+    """
+    settings = server.services.settings
+    return {
+        path
+        for path in settings.state_dir.rglob("*")
+        if not path.name.startswith("snap6d.sqlite") and settings.prepared_dir not in (path, path.parent)
+    }
 
 
 def test_a_dataset_tells_how_far_its_work_is(own_live: LiveServer) -> None:
@@ -64,6 +70,18 @@ def test_a_dataset_tells_how_far_its_work_is(own_live: LiveServer) -> None:
         client.post(f"/api/registrations/{begin(client)['id']}/submit")
     submitted = script.get(f"/api/datasets/{dataset['id']}").json()["tasks_submitted"]
     assert submitted == 1  # a task that two people did is one task
+
+
+def test_it_is_told_when_snaps_know_the_objects_of_an_upload(
+    server: LiveServer, chief: httpx.Client, demo: Path
+) -> None:
+    dataset = upload(chief, packed(demo, "prepared/"), "prepared.zip").json()
+    assert dataset["problems"] == [] and dataset["objects_prepared"] <= dataset["objects"] == 2
+
+    def prepared() -> bool:
+        return chief.get(f"/api/datasets/{dataset['id']}").json()["objects_prepared"] == 2
+
+    wait_until(prepared, "the objects to be prepared")
 
 
 def test_an_unknown_dataset_is_said(operator: httpx.Client) -> None:
@@ -80,7 +98,7 @@ def test_an_upload_is_taken_in_once(
     assert answer.status_code == 201
     dataset = answer.json()
     assert (dataset["name"], dataset["objects"], dataset["scenes"], dataset["tasks"]) == (name, 2, 2, 4)
-    assert dataset in chief.get("/api/datasets").json()["items"]
+    assert dataset["id"] in [item["id"] for item in chief.get("/api/datasets").json()["items"]]
     frame = chief.get(f"/api/scenes?dataset_id={dataset['id']}").json()["items"][0]["frames"][0]
     assert chief.get(frame["depth_url"]).content == (demo / POSED_SCENE / "depth/000000.png").read_bytes()
     rows, files = rows_of(server), files_of(server)

@@ -1,0 +1,105 @@
+"""Has the objects of all datasets built before anybody snaps to them, one after another."""
+
+import json
+import logging
+import threading
+
+from sqlalchemy import select
+
+from app import worker
+from app.database import Database
+from app.scene_data import SceneData
+from app.snapping import Snapper
+from app.tables import Object
+
+logger = logging.getLogger(__name__)
+
+KNOWN_AHEAD = worker.KEPT_OBJECTS // 2
+"""The newest objects, which workers know before anybody opens a task; the other half of what they keep is for
+those that somebody does open."""
+
+Key = tuple[str, str, str]
+"""All that what is built of an object depends on, as its row has it."""
+
+
+class Preparation:
+    """Looks for objects that workers have not built yet, and lets them do so.
+
+    What is built is kept at once, so a server that is stopped goes on where it was; and what was built by
+    another algorithm counts as missing, so an update has all of it built again.
+
+    Args:
+        database: With the objects.
+        data: Their meshes.
+        snapper: With the workers.
+    """
+
+    def __init__(self, database: Database, data: SceneData, snapper: Snapper) -> None:
+        self._database = database
+        self._data = data
+        self._snapper = snapper
+        self._hashes: dict[Key, str] = {}
+        """`ObjectModel.content_hash` of the objects that are prepared."""
+        self._problems: dict[Key, str] = {}
+        """Why objects cannot be."""
+        self._wanted = threading.Event()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="preparation", daemon=True)
+
+    def start(self) -> None:
+        """Begin with what there is."""
+        self._wanted.set()
+        self._thread.start()
+
+    def look(self) -> None:
+        """Say that there may be new objects, or new symmetries."""
+        self._wanted.set()
+
+    def is_prepared(self, item: Object) -> bool:
+        """Whether workers have built what snaps need of an object."""
+        return _key(item) in self._hashes
+
+    def problem(self, item: Object) -> str | None:
+        """Why an object cannot be snapped to, in one sentence; None where nothing speaks against it."""
+        return self._problems.get(_key(item))
+
+    def close(self) -> None:
+        """Take up nothing more. What workers are at ends with the snapper."""
+        self._closed = True
+        self._wanted.set()
+
+    def _run(self) -> None:
+        while self._wanted.wait() and not self._closed:
+            self._wanted.clear()
+            try:
+                self._prepare_all()
+            except Exception:  # what is missing is looked for again
+                if not self._closed:
+                    logger.exception("objects could not be prepared")
+
+    def _prepare_all(self) -> None:
+        with self._database.read() as session:
+            items = session.scalars(select(Object).order_by(Object.id.desc())).all()
+        for item in items:
+            if self._closed:
+                return
+            if not self.is_prepared(item) and self.problem(item) is None:
+                self._prepare(item)
+        hashes = [self._hashes[key] for key in map(_key, items) if key in self._hashes]
+        self._snapper.hand_over(hashes[:KNOWN_AHEAD])
+
+    def _prepare(self, item: Object) -> None:
+        try:
+            model = self._data.model(item)
+            self._snapper.built(model).result()
+        except ValueError as error:
+            self._problems[_key(item)] = f"{item.name} cannot be snapped to: {error}."
+        except Exception as error:  # a worker died, or cannot be reached: the next look tries again
+            if not self._closed:
+                logger.warning("object %d could not be prepared: %s", item.id, error)
+        else:
+            self._hashes[_key(item)] = model.content_hash
+
+
+def _key(item: Object) -> Key:
+    return item.mesh_hash, item.mesh_format, json.dumps(item.symmetries, sort_keys=True)

@@ -1,0 +1,72 @@
+"""The objects of all datasets are built in the background, on real workers."""
+
+from collections.abc import Iterator
+from contextlib import closing
+
+import pytest
+from sqlalchemy import select
+
+from app.preparation import Preparation
+from app.scene_data import symmetries_to_json
+from app.services import Services
+from app.tables import Object
+from registration_core import Symmetries
+from registration_core.object_model import ContinuousSymmetry
+from tests.app.test_importing import THREAD_MESH
+from tests.app.test_snapping import knowing
+from tests.app.waiting import wait_until
+
+
+@pytest.fixture
+def preparation(services: Services) -> Iterator[Preparation]:
+    with closing(services.preparation) as prepared:
+        yield prepared
+
+
+def objects_of(services: Services) -> list[Object]:
+    with services.database.read() as session:
+        return list(session.scalars(select(Object)))
+
+
+def hashes_of(services: Services) -> list[str]:
+    return [services.data.model(item).content_hash for item in objects_of(services)]
+
+
+def wait_until_prepared(services: Services) -> None:
+    wait_until(
+        lambda: all(map(services.preparation.is_prepared, objects_of(services))), "the objects to be prepared"
+    )
+
+
+def test_what_is_there_is_built_kept_and_known_to_all_workers(services, preparation):
+    assert not any(map(preparation.is_prepared, objects_of(services)))
+    preparation.start()
+    wait_until_prepared(services)
+    for model_hash in hashes_of(services):
+        wait_until(lambda h=model_hash: knowing(services.snapper, h) == 2, "every worker to know it")
+    files = {path.name.split(".")[0] for path in services.settings.prepared_dir.iterdir()}
+    assert files == set(hashes_of(services))
+
+
+def test_new_symmetries_are_built_when_it_looks_again(services, preparation):
+    preparation.start()
+    wait_until_prepared(services)
+    around = Symmetries(continuous=(ContinuousSymmetry((0.0, 0.0, 1.0)),))
+    with services.database.write() as session:
+        session.scalars(select(Object)).first().symmetries = symmetries_to_json(around)
+    assert [preparation.is_prepared(item) for item in objects_of(services)].count(False) == 1
+    preparation.look()
+    wait_until_prepared(services)
+
+
+def test_an_object_that_cannot_be_built_says_why_and_stops_no_other(services, preparation):
+    with services.database.write() as session:
+        first = session.scalars(select(Object)).first()
+        first.mesh_hash, first.name = services.files.put_bytes(THREAD_MESH.encode()), "thread"
+    preparation.start()
+    bad, *others = objects_of(services)
+    wait_until(lambda: preparation.problem(bad), "the object to be looked at, which is the last")
+    assert all(map(preparation.is_prepared, others))
+    assert not preparation.is_prepared(bad)
+    assert preparation.problem(bad).startswith("thread cannot be snapped to: mesh is too thin")
+    assert preparation.problem(others[0]) is None
