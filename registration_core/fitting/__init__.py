@@ -1,0 +1,1 @@
+"""Makes the fitted numbers of a snap from nothing: scenes, candidates, features, weights, calibration."""
