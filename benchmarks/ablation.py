@@ -12,6 +12,7 @@ from benchmarks.registration.instances import HALF, HIDDEN, Instance, synthetic_
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.starts import FAR, MIDDLE, Shell, starts
 from registration_core import SnapConfig, snap, warm_up
+from registration_core.evidence import BELOW, RING
 from registration_core.snap_config import RoundConfig, StageConfig
 
 TITLE = "Ablation: ADD(-S) < 10 % on synthetic scenes, from 5 cm/30° and 10 cm/60° together"
@@ -41,7 +42,8 @@ def variants() -> list[Variant]:
     proposals, agreement = DEFAULT.proposals, DEFAULT.agreement
     selection, observation = DEFAULT.selection, DEFAULT.observation
     without_prior = replace(selection, prior=0.0), replace(agreement, prior=0.0)
-    no_ring = (0.0,) * len(selection.ring)
+    no_rings = (*selection.classes[:RING], *(0.0,) * (BELOW - RING), *selection.classes[BELOW:])
+    under_it = (*selection.classes[:BELOW], 0.0)
     return [
         Variant("the default", DEFAULT),
         Variant("spread of the start told", DEFAULT, is_told=True),
@@ -73,7 +75,11 @@ def variants() -> list[Variant]:
             replace(DEFAULT, selection=without_prior[0], agreement=without_prior[1]),
         ),
         Variant(
-            "no evidence beyond the outline", replace(DEFAULT, selection=replace(selection, ring=no_ring))
+            "no evidence beyond the outline",
+            replace(DEFAULT, selection=replace(selection, classes=no_rings)),
+        ),
+        Variant(
+            "nothing lost below the plane", replace(DEFAULT, selection=replace(selection, classes=under_it))
         ),
         Variant(
             "no lead demanded", replace(DEFAULT, selection=replace(selection, lead=0.0, lead_over_fit=0.0))

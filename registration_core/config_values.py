@@ -21,9 +21,9 @@ LEAST = {
     **dict.fromkeys(("share", "doubt", "plane_weight", "gaussian_share", "ray_share", "least_share"), 0.0),
 }
 """Numbers that must not be smaller than this, by the name of their field."""
-FIXED_LENGTH = ("off_plane", "on_plane", "ring")
+FIXED_LENGTH = ("classes", "weights")
 """Lists whose items have a meaning by their place."""
-MOST_ITEMS = 16
+MOST_ITEMS = 64
 """Of any list."""
 SHOWN = 60
 """Characters of a wrong value that a message repeats."""

@@ -1,64 +1,119 @@
 # mypy: allow-untyped-defs
 """What the pixels say of a candidate pose: it is rendered, and every pixel in and around its outline counted.
 
-A pixel inside the outline falls into a bin by how far behind the claimed surface it was measured. A pixel
-just outside tells whether the surface ends where the outline does. Counts are divided by one area for all
-candidates, so that a background which does not depend on the pose cancels and candidates of different
-outlines are compared on the union of their pixels.
+A pixel inside the outline falls into a bin by how far behind the claimed surface it was measured; bins of
+the claim's own rims are apart from those of its inner parts, since sensors fray and round what they see at
+rims. A pixel just outside, or a little farther out, tells whether the surface ends where the outline does.
+Counts are divided by one area for all candidates, so that a background which does not depend on the pose
+cancels and candidates of different outlines are compared on the union of their pixels.
 
 A pixel of a known object says nothing for or against what it hides, and never that a surface goes on; only a
 surface claimed clearly before it was seen through.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from registration_core.kernels import EXACT, Array32, f4
+from registration_core.kernels import EXACT, Array32
 from registration_core.observation import NEAREST, Grid
 from registration_core.rasterizer import draw_mesh
 from registration_core.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]
 
-BEHIND = np.array([-0.030, -0.012, -0.006, -0.003, 0.003, 0.006, 0.012, 0.030])
+BEHIND = np.array([-0.030, -0.012, -0.006, 0.006, 0.012, 0.030])
 """Limits of the bins of "measured behind the claimed surface by", metres; pixels off the supporting plane."""
-BEHIND_ON_PLANE = np.array([-0.030, -0.012, -0.005, 0.005, 0.012, 0.030])
+BEHIND_ON_PLANE = np.array([-0.012, -0.006, 0.006, 0.012])
 """The same for pixels on the supporting plane."""
+BEYOND = np.array([-0.015, -0.006, 0.006, 0.015, 0.040])
+"""Limits of the bins of "measured behind the rim beside it by", metres; pixels outside, off the plane."""
+BEYOND_ON_PLANE = np.array([-0.006, 0.006, 0.015])
+"""The same for pixels on the supporting plane."""
+OUT = (2, 4)
+"""How far outside the outline pixels are counted, in two rings."""
 
-OFF_PLANE = 0
-"""First of the 9 bins of BEHIND."""
-ON_PLANE = OFF_PLANE + len(BEHIND) + 1
-"""First of the 7 bins of BEHIND_ON_PLANE."""
-UNMEASURED = ON_PLANE + len(BEHIND_ON_PLANE) + 1
-"""Inside the outline, without a measurement."""
-RING = UNMEASURED + 1
-"""First of the 8 classes of a pixel two beyond a part of the outline that agrees: unmeasured; the plane, near
-and clear; something in front; the same depth within 6, 15 and 40 mm; clear behind.
-"""
-COUNT = RING + 8
-CONTINUING = (4, 5, 6)
-"""The classes by which the surface may go on."""
+OFF_BINS, ON_BINS = len(BEHIND) + 1, len(BEHIND_ON_PLANE) + 1
+INSIDE_BINS = OFF_BINS + ON_BINS + 1
+"""Of each part, inner and rim: the bins off the plane, those on it, and one for what was not measured."""
+ON_PLANE, UNMEASURED = OFF_BINS, OFF_BINS + ON_BINS
+"""First bin on the plane, and the last one, within a part."""
+MATCHED, MATCHED_ON_PLANE = 3, ON_PLANE + 2
+"""The bins within a part of what was measured where it is claimed."""
+HIDDEN = (0, 1, ON_PLANE)
+"""The bins within a part of what something hides that lies clearly in front."""
+RING = 2 * INSIDE_BINS
+"""First class outside the outline."""
+OFF_RING, ON_RING = len(BEYOND) + 1, len(BEYOND_ON_PLANE) + 1
+RING_BINS = OFF_RING + ON_RING + 1
+"""Of each ring: the bins off the plane, those on it, and one for what was not measured."""
+ENDS = (4, 5, OFF_RING + 3)
+"""The bins within a ring of what was measured clearly behind the rim: the surface ends there."""
+BELOW = RING + len(OUT) * RING_BINS
+"""Share of the object's vertices that lie clearly below the supporting plane, where nothing can be."""
+COUNT = BELOW + 1
 
-MATCH = 0.006
-"""Limit of agreement beside which the ring is counted, metres."""
-MARGIN = 3
+STEP = 0.010
+"""Metres of depth between pixels of a claim, for each pixel that they are apart: beyond it they are rim."""
+AGREES = 0.010
+"""A pixel outside counts only beside a rim that was measured where it is claimed, within this, metres."""
+SEEN_THROUGH = 0.006
+"""Metres behind a claimed surface at which a known object says that the surface is not there."""
+GOES_ON = (-0.006, 0.040)
+"""Metres behind the rim between which the surface may go on outside."""
+SMALL = 0.06
+"""Metres: of an object with a smaller diameter all differences of depth count as if both were as large."""
+SUNK = 0.010
+"""How far below the plane a vertex must lie to count as below it, metres: depth errs, and so do planes."""
+MOST_BELOW = 0.5
+"""Of the vertices; more below says no more."""
+MARGIN = 5
 """Pixels around a candidate's outline that are looked at."""
 
 
+def class_names() -> tuple[str, ...]:
+    """What each of the COUNT classes counts, in their order."""
+    inside = _bin_names(BEHIND, "off plane") + _bin_names(BEHIND_ON_PLANE, "on plane") + ["unmeasured"]
+    outside = _bin_names(BEYOND, "off plane") + _bin_names(BEYOND_ON_PLANE, "on plane") + ["unmeasured"]
+    parts = [f"{part}, {name}" for part in ("inner", "rim") for name in inside]
+    rings = [f"{out} pixels out, {name}" for out in OUT for name in outside]
+    return (*parts, *rings, "below the plane")
+
+
+def _bin_names(limits: Array, where: str) -> list[str]:
+    ends = [f"{1000 * limit:.0f} mm" for limit in limits]
+    spans = [f"{low} to {high}" for low, high in pairwise(ends)]
+    return [f"{where}, {span}" for span in (f"before {ends[0]}", *spans, f"beyond {ends[-1]}")]
+
+
 def evidence(poses: Array32, model: ViewpointModel, grid: Grid, distance: float) -> Array:
-    """Counts (N, COUNT) for poses (N, 3, 4), as shares of the mean silhouette area at `distance` [m]."""
+    """Counts (N, COUNT) for poses (N, 3, 4), as shares of the mean silhouette area at `distance` [m]; the
+    last is a share of vertices.
+    """
     counts = np.zeros((len(poses), COUNT))
     _count(
         poses.astype(np.float64), model.coarse_vertices, model.coarse_faces, not model.coarse_is_closed, grid,
-        counts,
+        max(1.0, SMALL / model.diameter), counts,
     )  # fmt: skip
-    return counts / (model.mean_area * float(grid.fx) * float(grid.fy) / max(distance, NEAREST) ** 2)
+    counts /= model.mean_area * float(grid.fx) * float(grid.fy) / max(distance, NEAREST) ** 2
+    if grid.plane.any():
+        counts[:, BELOW] = np.minimum(below(poses, model.coarse_vertices, grid.plane), MOST_BELOW)
+    return counts
+
+
+def below(poses: Array32, vertices: Array32, plane: Array) -> Array:
+    """Share (N,) of the vertices (V, 3) that poses (N, 3, 4) put below a plane (4,), by more than SUNK."""
+    normals = np.einsum("i,nij->nj", plane[:3], poses.astype(np.float64))
+    heights = normals[:, :3] @ vertices.T.astype(np.float64) + (normals[:, 3:] + plane[3])
+    return np.mean(heights < -SUNK, axis=1)
 
 
 @njit(**EXACT)
-def _count(poses, vertices, faces, both_sides, grid, counts):
-    height, width = grid.depth.shape
+def _count(poses, vertices, faces, both_sides, grid, sharpness, counts):
+    depth, on_plane, known = grid.depth, grid.on_plane, grid.known
+    height, width = depth.shape
     fx, fy, cx, cy = float(grid.fx), float(grid.fy), float(grid.cx), float(grid.cy)
     inverse_depth = np.zeros((height, width))
     points = np.empty((vertices.shape[0], 3))
@@ -82,27 +137,35 @@ def _count(poses, vertices, faces, both_sides, grid, counts):
         crop = inverse_depth[first_row:end_row, first_column:end_column]
         crop[:] = 0.0
         draw_mesh(points, faces, fx, fy, cx - first_column, cy - first_row, crop, None, both_sides)
-        for row in range(first_row, end_row):
-            for column in range(first_column, end_column):
-                r, c = row - first_row, column - first_column
-                seen = float(grid.depth[row, column])
-                known = grid.known[row, column]
-                on_plane = grid.weight[row, column] < f4(0.5) and not known
-                if crop[r, c] > 0.0:
-                    behind = seen - 1.0 / crop[r, c]
-                    if seen <= 0.0:
-                        count[UNMEASURED] += 1
-                    elif known and behind < MATCH:
-                        count[OFF_PLANE] += 1
-                    elif on_plane:
-                        count[ON_PLANE + _bin(behind, BEHIND_ON_PLANE)] += 1
-                    else:
-                        count[OFF_PLANE + _bin(behind, BEHIND)] += 1
-                else:
-                    _count_ring(grid, crop, row, column, first_row, first_column, seen, on_plane, count)
+        seen = depth[first_row:end_row, first_column:end_column]
+        plane = on_plane[first_row:end_row, first_column:end_column]
+        others = known[first_row:end_row, first_column:end_column]
+        _count_inside(crop, seen, plane, others, sharpness, count)
+        _count_outside(crop, seen, plane, others, sharpness, count)
 
 
 @njit(**EXACT)
+def _count_inside(crop, depth, on_plane, known, sharpness, count):
+    """Count the pixels of the claimed surface; all arrays are (h, w), the part of the image about it."""
+    for r in range(crop.shape[0]):
+        for c in range(crop.shape[1]):
+            here = crop[r, c]
+            if here == 0.0:
+                continue
+            first = INSIDE_BINS if _is_rim(crop, r, c, here) else 0
+            seen = float(depth[r, c])
+            behind = sharpness * (seen - 1.0 / here)
+            if seen <= 0.0:
+                count[first + UNMEASURED] += 1
+            elif known[r, c] and behind < SEEN_THROUGH:
+                count[first] += 1
+            elif on_plane[r, c]:
+                count[first + ON_PLANE + _bin(behind, BEHIND_ON_PLANE)] += 1
+            else:
+                count[first + _bin(behind, BEHIND)] += 1
+
+
+@njit(**EXACT, inline="always")
 def _bin(value, limits):
     k = 0
     for limit in limits:
@@ -110,32 +173,68 @@ def _bin(value, limits):
     return k
 
 
-@njit(**EXACT)
-def _count_ring(grid, crop, row, column, first_row, first_column, seen, on_plane, count):
-    """Count a pixel outside the outline if the candidate's surface lies two pixels to a side of it."""
-    for dr, dc in ((0, -2), (0, 2), (-2, 0), (2, 0)):
-        r, c = row - first_row + dr, column - first_column + dc
-        if r < 0 or c < 0 or r >= crop.shape[0] or c >= crop.shape[1] or crop[r, c] == 0.0:
-            continue
-        rim = 1.0 / crop[r, c]
-        agrees = abs(grid.depth[row + dr, column + dc] - rim) < MATCH
-        if agrees and not grid.known[row + dr, column + dc]:
-            ring_class = _ring_class(seen, seen - rim, on_plane)
-            nothing_said = grid.known[row, column] and ring_class in CONTINUING
-            count[RING + (0 if nothing_said else ring_class)] += 1
-        return
+@njit(**EXACT, inline="always")
+def _is_rim(crop, r, c, here):
+    """Whether the claimed surface, of inverse depth `here`, ends or steps within two pixels."""
+    if r < 2 or c < 2 or r >= crop.shape[0] - 2 or c >= crop.shape[1] - 2:
+        return True
+    # |1 / a - 1 / b| > s means |a - b| > s a b; where nothing is drawn b is 0
+    near, far = STEP * here, 2.0 * STEP * here
+    return (
+        _steps(crop[r - 1, c], here, near)
+        or _steps(crop[r + 1, c], here, near)
+        or _steps(crop[r, c - 1], here, near)
+        or _steps(crop[r, c + 1], here, near)
+        or _steps(crop[r - 2, c], here, far)
+        or _steps(crop[r + 2, c], here, far)
+        or _steps(crop[r, c - 2], here, far)
+        or _steps(crop[r, c + 2], here, far)
+    )
+
+
+@njit(**EXACT, inline="always")
+def _steps(beside, here, most):
+    return beside == 0.0 or abs(beside - here) > most * beside
 
 
 @njit(**EXACT)
-def _ring_class(seen, behind, on_plane):
-    if seen <= 0.0:
-        return 0
-    if behind < -0.015:
-        return 3
-    if on_plane:
-        return 1 if behind < 0.015 else 2
-    if abs(behind) < 0.006:
-        return 4
-    if behind < 0.015:
-        return 5
-    return 6 if behind < 0.040 else 7
+def _count_outside(crop, depth, on_plane, known, sharpness, count):
+    """Count the pixels outside the outline, each in the ring that it lies in: by the side on which the
+    claimed surface is nearest.
+    """
+    height, width = crop.shape
+    for r in range(height):
+        for c in range(width):
+            if crop[r, c] > 0.0:
+                continue
+            for ring in range(len(OUT)):
+                apart = OUT[ring]
+                i, j = r, c
+                if c >= apart and crop[r, c - apart] > 0.0:
+                    j = c - apart
+                elif c + apart < width and crop[r, c + apart] > 0.0:
+                    j = c + apart
+                elif r >= apart and crop[r - apart, c] > 0.0:
+                    i = r - apart
+                elif r + apart < height and crop[r + apart, c] > 0.0:
+                    i = r + apart
+                else:
+                    continue
+                rim = 1.0 / crop[i, j]
+                if sharpness * abs(depth[i, j] - rim) < AGREES and not known[i, j]:
+                    seen = float(depth[r, c])
+                    kind = _ring_bin(seen, sharpness * (seen - rim), on_plane[r, c], known[r, c])
+                    count[RING + ring * RING_BINS + kind] += 1
+                break
+
+
+@njit(**EXACT, inline="always")
+def _ring_bin(seen, behind, on_plane, known):
+    nothing_said = known and GOES_ON[0] <= behind < GOES_ON[1]
+    if seen <= 0.0 or nothing_said:
+        kind = OFF_RING + ON_RING
+    elif on_plane:
+        kind = OFF_RING + _bin(behind, BEYOND_ON_PLANE)
+    else:
+        kind = _bin(behind, BEYOND)
+    return kind

@@ -38,6 +38,11 @@ class Grid(NamedTuple):
     cy: np.float32
     known: NDArray[np.bool_]
     """(H, W), where a known object was seen: it hides what lies behind, and is no part of what is sought."""
+    on_plane: NDArray[np.bool_]
+    """(H, W), where the supporting plane was seen."""
+    plane: NDArray[np.float64]
+    """(4,), unit normal n and offset d of the supporting plane: `n p + d` is how far a point lies above it,
+    on the camera's side, metres; all 0 where there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +140,7 @@ def observe_region(
     weight, known = np.ones_like(reduced), np.zeros(reduced.shape, np.bool_)
     if explained is not None:
         known[1:-1, 1:-1] = _reduced_mask(explained[top:bottom, left:right], block)
-    grid = Grid(reduced, normals, weight, fx, fy, cx, cy, known)
+    grid = Grid(reduced, normals, weight, fx, fy, cx, cy, known, np.zeros_like(known), np.zeros(4))
     unknown = grid._replace(depth=np.where(known, f4(0), reduced))
     plane = _find_plane(unknown, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
     silhouette = model.mean_area * float(fx) * float(fy) / max(distance, NEAREST) ** 2
@@ -143,7 +148,10 @@ def observe_region(
         config.plane_share, config.plane_excess * silhouette / max(int(np.count_nonzero(unknown.depth)), 1)
     )
     if plane[4] > least:
-        _weigh_plane(grid, plane, f4(config.plane_tolerance), f4(config.plane_weight), weight)
+        _mark_plane(grid, plane, f4(config.plane_tolerance), grid.on_plane)
+        grid.plane[:] = plane[:4] if plane[3] > 0 else -plane[:4]  # towards the camera
+    grid.on_plane[known] = False
+    weight[grid.on_plane] = f4(config.plane_weight)
     weight[known] = f4(0)
     near = np.abs(reduced - distance) < model.radius + config.reach
     return Observation(grid, int(np.count_nonzero(near & (unknown.depth > 0))), block)
@@ -325,13 +333,12 @@ def _refit_plane(p, count, tolerance, plane):
 
 
 @njit(**FAST)
-def _weigh_plane(grid, plane, tolerance, plane_weight, weight):
-    for i in range(weight.shape[0]):
-        for j in range(weight.shape[1]):
+def _mark_plane(grid, plane, tolerance, on_plane):
+    for i in range(on_plane.shape[0]):
+        for j in range(on_plane.shape[1]):
             z = grid.depth[i, j]
             x, y = (j - grid.cx) / grid.fx * z, (i - grid.cy) / grid.fy * z
             d = plane[0] * x + plane[1] * y + plane[2] * z + plane[3]
             nx, ny, nz = grid.normals[0, i, j], grid.normals[1, i, j], grid.normals[2, i, j]
             along = abs(plane[0] * nx + plane[1] * ny + plane[2] * nz)
-            if abs(d) < tolerance and (along > f4(0.8) or along == f4(0)):
-                weight[i, j] = plane_weight
+            on_plane[i, j] = z > 0 and abs(d) < tolerance and (along > f4(0.8) or along == f4(0))

@@ -117,7 +117,7 @@ def checked_depth(depth: ArrayLike, camera: Intrinsics) -> NDArray[np.float32]:
         ValueError: where its shape is not the camera's, it holds no depth, or it seems to be in millimetres.
     """
     try:
-        image = np.asarray(depth, dtype=np.float32)
+        image = np.ascontiguousarray(depth, dtype=np.float32)
     except (TypeError, ValueError):
         raise ValueError("depth must be an image of numbers") from None
     if image.shape != (camera.height, camera.width):

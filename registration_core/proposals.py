@@ -87,7 +87,7 @@ def _around_start(
                 continue
             anchored = True
             row, column, seen = row_now, column_now, seen_now
-            if grid.weight[row, column] > f4(0.5):
+            if not grid.on_plane[row, column] and not grid.known[row, column]:
                 break
         if not anchored:
             continue
@@ -106,7 +106,7 @@ def anywhere(surface: Surface, grid: Grid, count: int, rng: np.random.Generator)
     """Poses (count, 3, 4), each with a point of the model on a pixel off the plane, normal on normal, turned
     about it at random; none where no pixel has a normal.
     """
-    pixels = np.argwhere((grid.weight > 0.5) & (grid.normals != 0.0).any(axis=0)).astype(np.int32)
+    pixels = np.argwhere(~grid.on_plane & ~grid.known & (grid.normals != 0.0).any(axis=0)).astype(np.int32)
     poses = np.empty((count if len(pixels) else 0, 3, 4), np.float32)
     _anywhere(pixels, surface, grid, random_state(rng), poses)
     return poses

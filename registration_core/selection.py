@@ -18,8 +18,8 @@ LEAST_CLAIM = 0.3
 """Share of the mean silhouette: no smaller a claim is trusted in `match_shares`."""
 LEAST_OUTLINE = 0.05
 """The same for the outline in `shown_shares`."""
-HIDDEN = [evidence.OFF_PLANE, evidence.OFF_PLANE + 1, evidence.ON_PLANE, evidence.ON_PLANE + 1]
-"""Classes of pixels that something hides which lies clearly in front."""
+PLANE_MATCH = 0.5
+"""What a match on the supporting plane counts: the plane alone would match as well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,9 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
     """Log-odds (N,) of candidates, up to a constant, of their counts (N, evidence.COUNT) and how far they are
     from the start, (N,) as `heavy_tails` gives it.
     """
-    weights = np.array([*config.off_plane, *config.on_plane, config.unmeasured, *config.ring])
-    return counts @ weights + config.match_share * match_shares(counts) - config.prior * tails
+    return (
+        counts @ np.array(config.classes) + config.match_share * match_shares(counts) - config.prior * tails
+    )
 
 
 def leads(candidates: Array32, counts: Array, config: SelectionConfig) -> Array:
@@ -88,36 +89,28 @@ def chosen(scores: Array, near: int, leads: Array) -> int:
     return winner
 
 
-def is_settled(judgement: Judgement, candidates: Array32, config: SelectionConfig) -> bool:
-    """Whether the winner among the start and its polishes, (N, 3, 4), fits so well and has moved so little
-    that nothing else need be looked for.
-    """
-    start, winner = candidates[0], candidates[judgement.winner]
-    moved = float(np.linalg.norm(winner[:, 3] - start[:, 3]))
-    turned = float(np.sqrt(max(squared_angle(winner, start), 0.0)))
-    return bool(
-        match_shares(judgement.counts[[judgement.winner]])[0] > config.settled_match
-        and moved < config.settled_translation
-        and turned < config.settled_rotation
-    )
-
-
 def match_shares(counts: Array) -> Array:
     """Share (N,) of the surface claimed and not hidden that was measured where it is claimed, off the plane
     or on it.
     """
-    on_plane = counts[:, evidence.ON_PLANE + 3]
-    matched = counts[:, evidence.OFF_PLANE + 3 : evidence.OFF_PLANE + 6].sum(axis=1) + 0.5 * on_plane
-    return matched / np.maximum(_claims(counts)[1], LEAST_CLAIM)
+    inside = _inside(counts)
+    matched = inside[:, evidence.MATCHED] + PLANE_MATCH * inside[:, evidence.MATCHED_ON_PLANE]
+    return matched / np.maximum(_claims(inside)[1], LEAST_CLAIM)
 
 
 def shown_shares(counts: Array) -> Array:
     """Share (N,) of the outline's pixels that nothing in front hides."""
-    outlines, shown = _claims(counts)
+    outlines, shown = _claims(_inside(counts))
     return shown / np.maximum(outlines, LEAST_OUTLINE)
 
 
-def _claims(counts: Array) -> tuple[Array, Array]:
+def _inside(counts: Array) -> Array:
+    """Counts (N, INSIDE_BINS) of the inner part and the rim together."""
+    bins = evidence.INSIDE_BINS
+    return counts[:, :bins] + counts[:, bins : 2 * bins]
+
+
+def _claims(inside: Array) -> tuple[Array, Array]:
     """Pixels within the outlines (N,), and those of them that are not hidden (N,)."""
-    outlines = counts[:, : evidence.RING].sum(axis=1)
-    return outlines, outlines - counts[:, HIDDEN].sum(axis=1)
+    outlines = inside.sum(axis=1)
+    return outlines, outlines - inside[:, list(evidence.HIDDEN)].sum(axis=1)

@@ -20,7 +20,6 @@ from registration_core.particle_filter import Noise, ParticleFilter, initial_pos
 from registration_core.problem import checked_problem
 from registration_core.search import search_of
 from registration_core.seeding import seed_of
-from registration_core.selection import is_settled
 from registration_core.snap_config import SnapConfig
 from registration_core.snap_run import Sighting, SnapRun
 from registration_core.verdict import certainty, judged, nothing_seen, outcome, progress, verdict
@@ -97,9 +96,6 @@ def _viewpoint_steps(run: SnapRun) -> Iterator[SnapStep]:
     candidates = np.concatenate([run.problem.prior.start[None], run.polished_start()])
     counts = run.evidence(candidates)
     judgement = run.judge(candidates, counts)
-    if is_settled(judgement, candidates, config.selection):
-        yield verdict(run, 1, candidates, judgement)
-        return
     iteration, best, known = 1, candidates[[judgement.winner]], judgement.of_winner
     yield progress(run, iteration, iterations, best, *known)
     for one in config.rounds:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 from registration_core.config_values import merged, plain
+from registration_core.fitted import FITTED
 
 
 @dataclass(frozen=True)
@@ -72,11 +73,11 @@ class ProposalConfig:
 class AgreementConfig:
     """Weights of the sparse agreement (agreement.py)."""
 
-    free: float = 1.5
+    free: float = 0.9
     """Of surface claimed where the sensor saw through."""
     missing: float = 0.05
     """Of surface claimed where there is no measurement."""
-    ring: float = 1.5
+    ring: float = 0.7
     """Of observed surface that goes on beyond the silhouette."""
     clear: float = 0.3
     """Reward of a silhouette before a background that lies farther."""
@@ -84,7 +85,7 @@ class AgreementConfig:
     """How much a view that shows more of the object counts more."""
     prior: float = 0.03
     """Of the heavy-tailed prior about the start."""
-    wide_softening: float = 0.6
+    wide_softening: float = 1.0
     """Factor on `free` and `ring` in the first stage, where no hypothesis is exact yet."""
 
 
@@ -114,12 +115,12 @@ class StageConfig:
 class SelectionConfig:
     """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
 
-    prior: float = 1.7
+    prior: float = FITTED.prior
     """Weight of the heavy-tailed prior about the start."""
     lead: float = 1.0
     """The polished start replaces the start, and another mode replaces that, only if it scores better by this
     much, ..."""
-    lead_over_fit: float = 4.0
+    lead_over_fit: float = 2.0
     """... or by this much where the start itself fits, ..."""
     fit_match: float = 0.7
     """... which it does where more of the claimed surface than this is matched, ..."""
@@ -129,40 +130,22 @@ class SelectionConfig:
     """... or this, radians."""
     min_match: float = 0.04
     """With less of the claimed surface matched than this, the start is kept."""
-    settled_match: float = 0.9
-    """With more of it matched by a polish of the start ..."""
-    settled_translation: float = 0.01
-    """... that moved no farther than this, metres, ..."""
-    settled_rotation: float = 0.13
-    """... and this, radians, nothing else is looked for."""
-    match_share: float = 10.0
+    match_share: float = FITTED.match_share
     """Weight of the share of the claimed surface that was measured where it is claimed."""
-    off_plane: tuple[float, ...] = (0.4, -13.6, -25.1, -14.2, 4.5, -17.3, -24.8, -23.1, -17.4)
-    """Weights of pixels off the plane, by how far behind the claimed surface they were measured."""
-    on_plane: tuple[float, ...] = (-7.5, -19.8, -56.9, -26.0, -88.2, -40.5, -21.0)
-    """The same for pixels on it."""
-    unmeasured: float = 0.0
-    """Weight of pixels without a measurement."""
-    ring: tuple[float, ...] = (10.0, 0.0, 10.0, 26.4, -34.7, -15.2, -22.2, 10.0)
-    """Weights of what lies just beyond the outline."""
+    classes: tuple[float, ...] = FITTED.classes
+    """Weights of the classes of pixels, in the order of `evidence.class_names()`."""
 
 
 @dataclass(frozen=True)
 class ConfidenceConfig:
     """Calibration of the confidence (confidence.py)."""
 
-    temperature: float = 0.5
+    temperature: float = FITTED.temperature
     """Of the softmax that shares the belief among the modes."""
     mode_radius: float = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
-    intercept: float = -2.79
-    """Logit of being right for a pose of which nothing speaks, for or against."""
-    score: float = 0.433
-    """Logistic weight of its score, which the evidence and the distance from the start give it."""
-    match: float = 1.97
-    """The same of the share of the claimed surface that was measured where it should be, ..."""
-    shown: float = 2.80
-    """... and of the share that is not hidden."""
+    weights: tuple[float, ...] = FITTED.confidence
+    """Logistic weights of what speaks for the winner, in the order of `confidence.FEATURES`."""
 
 
 @dataclass(frozen=True)
@@ -205,8 +188,8 @@ class AnywhereConfig:
 
 DEFAULT_STAGES = (
     StageConfig(1500, 0.015, 0.25, 4, 0.03, 0.012, 64, 0.010),
-    StageConfig(250, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
-    StageConfig(60, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+    StageConfig(400, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
+    StageConfig(150, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
 )
 
 
@@ -222,11 +205,11 @@ class RoundConfig:
     """The round is left out where the confidence so far is higher than this."""
 
 
-DEFAULT_ROUNDS = (
-    RoundConfig(0.3, 1.0, 1.0),
-    RoundConfig(0.5, 1.4, 0.95),
-    RoundConfig(0.5, 1.6, 0.6),
-    RoundConfig(1.0, 1.6, 0.2),
+ROUNDS = ((0.3, 1.0), (0.5, 1.4), (0.8, 1.6))
+"""Share and widening of each; from which confidence on one is left out is fitted."""
+DEFAULT_ROUNDS = tuple(
+    RoundConfig(share, widening, doubt)
+    for (share, widening), doubt in zip(ROUNDS, FITTED.doubts, strict=True)
 )
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from registration_core.agreement import heavy_tails
 from registration_core.ambiguity import ambiguities
 from registration_core.certificates import certified
-from registration_core.confidence import confidence, grouped
+from registration_core.confidence import belief_in_first, confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct
@@ -60,8 +60,9 @@ def verdict(run: SnapRun, iteration: int, candidates: Array32, judgement: Judgem
 def certainty(run: SnapRun, candidates: Array32, judgement: Judgement) -> float:
     """The confidence that a `verdict` on these candidates (N, 3, 4) would have."""
     log_odds = _tempered(judgement.scores, run.problem)
-    _, masses = _modes(run.problem, candidates, judgement.winner, log_odds)
-    return confidence(float(masses[0]), *judgement.of_winner, run.problem.config.confidence)
+    modes, masses = _modes(run.problem, candidates, judgement.winner, log_odds)
+    mass = belief_in_first(modes, masses, run.problem.model)
+    return confidence(mass, *judgement.of_winner, run.problem.config.confidence)
 
 
 def outcome(run: SnapRun, iteration: int, particles: Array32, log_weights: Array) -> SnapStep:
@@ -84,17 +85,23 @@ def nothing_seen(run: SnapRun, iteration: int) -> SnapStep:
 
 
 def found_anywhere(problem: Problem, candidates: Array32, counts: Array, most: int) -> tuple[Hypothesis, ...]:
-    """At most so many modes of candidates (N, 3, 4), of evidence (N, COUNT), best first, where there is no
-    start; none where nothing fits.
+    """At most so many modes of candidates (N, 3, 4), of evidence (N, COUNT), best first and each with its
+    chance, where there is no start; none where nothing fits.
     """
-    config = problem.config.selection
-    seen = match_shares(counts) >= config.min_match
+    config = problem.config
+    seen = match_shares(counts) >= config.selection.min_match
     if not seen.any():
         return ()
-    candidates, values = candidates[seen], scores(counts[seen], np.zeros(np.count_nonzero(seen)), config)
+    candidates, counts = candidates[seen], counts[seen]
+    values = scores(counts, np.zeros(len(candidates)), config.selection)
     log_odds = _tempered(values, problem)
-    modes, masses = _modes(problem, candidates, int(np.argmax(log_odds)), log_odds)
-    return _hypotheses(problem.uncentred(from_rows(modes[:most])), masses[:most])
+    modes, masses = grouped(candidates, int(np.argmax(log_odds)), log_odds, problem.model, config.confidence)
+    modes, masses = modes[:most], masses[:most]
+    poses = problem.uncentred(from_rows(candidates[modes]))
+    return tuple(
+        Hypothesis(T, float(mass), confidence(float(mass), float(values[k]), counts[k], config.confidence))
+        for T, mass, k in zip(poses, masses, modes, strict=True)
+    )
 
 
 def _conclusion(
@@ -116,7 +123,8 @@ def _conclusion(
     if match_shares(counts[None])[0] < config.selection.min_match:
         return nothing_seen(run, iteration)
     modes, masses = _modes(run.problem, candidates, winner, log_odds)
-    belief = confidence(float(masses[0]), score, counts, config.confidence)
+    mass = belief_in_first(modes, masses, run.problem.model)
+    belief = confidence(mass, score, counts, config.confidence)
     return _final(run, iteration, modes, masses, belief, True)
 
 

@@ -10,10 +10,12 @@ import threading
 import zipfile
 from collections import OrderedDict
 from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from registration_core.algorithm import VIEWPOINT_ALGORITHM
 from registration_core.kernels import Array32, f4
@@ -76,6 +78,16 @@ class ViewpointModel:
     """(E, 3), spread-out outermost points: how far they move is how far two poses are apart."""
     symmetries: Array32
     """(S, 3, 4), identity first, in the centred frame."""
+
+    @cached_property
+    def sample(self) -> Array32:
+        """Points (P, 3) all over the surface, a few from each of many sides."""
+        return self.points[:: len(self.points) // 60, :, ::32].transpose(0, 2, 1).reshape(-1, 3)
+
+    @cached_property
+    def surface_tree(self) -> cKDTree:
+        """Looks up how far a point is from the surface, to about a hundredth of the diameter."""
+        return cKDTree(self.points[:, :, ::8].transpose(0, 2, 1).reshape(-1, 3))
 
 
 Registrable = ObjectModel | ViewpointModel

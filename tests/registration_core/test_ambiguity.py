@@ -68,7 +68,8 @@ def test_half_turn_of_a_box_is_another_mode_unless_it_is_known(symmetries) -> No
         assert others[0].motion == "turn"
         assert others[0].extent == pytest.approx(np.pi, abs=0.1)
         assert np.abs(others[0].axis).max() > 0.98
-        assert estimate.confidence < 0.7
+        assert not estimate.certificates.non_degenerate  # though depth fits: what it cannot tell apart is one
+        assert estimate.confidence > 0.9
 
 
 def test_hidden_object_may_be_anywhere() -> None:

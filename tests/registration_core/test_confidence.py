@@ -2,13 +2,23 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from registration_core import SnapConfig, pose
-from registration_core.confidence import confidence, mode_masses, modes_of
-from registration_core.evidence import COUNT, OFF_PLANE
+from registration_core.confidence import (
+    FEATURES,
+    belief_in_first,
+    confidence,
+    features,
+    grouped,
+    mode_masses,
+    modes_of,
+    twins_of_first,
+)
+from registration_core.evidence import COUNT, MATCHED, OFF_BINS
 from registration_core.kernels import to_rows
 from registration_core.viewpoint_model import viewpoint_model
-from tests.registration_core.simple_scene import tool
+from tests.registration_core.simple_scene import model_of, tool
 
 CONFIG = SnapConfig().confidence
 
@@ -25,21 +35,54 @@ def test_mass_of_a_mode_is_that_of_its_best() -> None:
     np.testing.assert_allclose(masses, [np.e / (np.e + 1), 1 / (np.e + 1)])
 
 
+def test_poses_that_put_the_same_surface_there_are_twins_whatever_symmetries_are_told() -> None:
+    can = viewpoint_model(model_of(trimesh.creation.cylinder(radius=0.03, height=0.1)))
+    assert len(can.symmetries) == 1
+    turned = pose.exp([0, 0, 0, 0, 0, 1.0])
+    poses = to_rows(np.stack([np.eye(4), turned, pose.exp([0, 0, 0, 1.0, 0, 0])]))
+    np.testing.assert_array_equal(twins_of_first(poses, np.full(3, 1 / 3), can), [1])
+    assert not len(twins_of_first(poses[:2], np.array([1.0, 0.001]), can))  # too little mass to look at
+    tooled = viewpoint_model(tool())
+    assert not len(twins_of_first(poses, np.full(3, 1 / 3), tooled))
+
+
+def test_twins_stay_modes_of_their_own_but_the_belief_is_in_all_of_them() -> None:
+    can = viewpoint_model(model_of(trimesh.creation.cylinder(radius=0.03, height=0.1)))
+    turns = [pose.exp([0, 0, 0, 0, 0, angle]) for angle in (0.0, 1.0, 2.0, 3.0)]
+    poses = to_rows(np.stack([*turns, pose.exp([0.1, 0, 0, 0, 0, 0])]))
+    found, masses = grouped(poses, 0, np.zeros(5), can, CONFIG)
+    np.testing.assert_allclose(masses, np.full(5, 0.2))
+    assert belief_in_first(poses[found], masses, can) == pytest.approx(0.8)
+
+
+def test_what_has_no_mass_is_no_mode() -> None:
+    model = viewpoint_model(tool())
+    poses = to_rows(np.stack([np.eye(4), pose.exp([0.1, 0, 0, 0, 0, 0]), pose.exp([0.2, 0, 0, 0, 0, 0])]))
+    found, masses = grouped(poses, 0, np.array([50.0, 49.0, 0.0]), model, CONFIG)
+    np.testing.assert_array_equal(found, [0, 1])
+    assert masses.sum() == pytest.approx(1.0)
+
+
 def shares(match: float, seen_through: float) -> np.ndarray:
     values = np.zeros(COUNT)
-    values[OFF_PLANE + 4], values[OFF_PLANE + 8] = match, seen_through
+    values[MATCHED], values[OFF_BINS - 1] = match, seen_through
     return values
 
 
-def test_confidence_rises_with_mass_score_match_and_visibility() -> None:
+def test_features_are_what_they_are_called() -> None:
+    spoken = features(np.array([0.5]), np.array([3.0]), shares(0.75, 0.25)[None])[0]
+    found = dict(zip(FEATURES, spoken, strict=True))
+    assert found["mass"] == pytest.approx(0.0)
+    assert found["score"] == 3.0
+    assert found["inner match"] == pytest.approx(0.75)
+    assert found["shown"] == 1.0
+
+
+def test_confidence_rises_with_mass_score_and_match() -> None:
     good, poor = shares(0.9, 0.0), shares(0.3, 0.6)
-    hidden = good.copy()
-    hidden[OFF_PLANE] = 1.5
     assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.3, 8.0, good, CONFIG)
     assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 0.0, good, CONFIG)
     assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 8.0, poor, CONFIG)
-    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 8.0, hidden, CONFIG)
-    assert confidence(1.0, 8.0, good, CONFIG) > 0.9
     assert confidence(0.2, -8.0, poor, CONFIG) < 0.2
 
 

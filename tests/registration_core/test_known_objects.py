@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from registration_core import SnapConfig, explained_pixels, pose, snap
-from registration_core.evidence import OFF_PLANE, RING, UNMEASURED, evidence
+from registration_core.evidence import INSIDE_BINS, MATCHED, OFF_BINS, RING, UNMEASURED, evidence
 from registration_core.kernels import to_rows
 from registration_core.observation import observe
 from registration_core.rasterizer import render_depth
@@ -84,7 +84,7 @@ def test_what_a_nearer_thing_hides_is_not_explained(pair) -> None:
 
 
 def counts_of(pair, T: np.ndarray) -> np.ndarray:
-    """The evidence of a pose where the twin is known."""
+    """The evidence inside the outline of a pose, (INSIDE_BINS,), where the twin is known."""
     model, depth, done, _ = pair
     viewpoints = viewpoint_model(model)
     centred = T @ pose.from_rotation_translation(np.eye(3), viewpoints.centre)
@@ -92,27 +92,28 @@ def counts_of(pair, T: np.ndarray) -> np.ndarray:
     observed = observe(
         depth, CAMERA, centred[:3, 3], viewpoints, SnapConfig().observation, np.random.default_rng(0), mask
     )
-    return evidence(to_rows(centred), viewpoints, observed.grid, centred[2, 3])[0]
+    counts = evidence(to_rows(centred), viewpoints, observed.grid, centred[2, 3])[0]
+    return counts[:INSIDE_BINS] + counts[INSIDE_BINS:RING]
 
 
 def test_behind_a_known_object_lies_the_unknown(pair) -> None:
     _, _, done, _ = pair
     behind = counts_of(pair, pose.exp([*(0.15 * done[:3, 3]), 0, 0, 0]) @ done)
-    inside = behind[:RING].sum()
-    assert behind[OFF_PLANE] > 0.9 * inside
+    inside = behind.sum()
+    assert behind[0] > 0.9 * inside
     assert behind[UNMEASURED] < 0.1 * inside
 
 
 def test_known_object_seen_through_a_claim_counts_against_it(pair) -> None:
     _, _, done, _ = pair
     before = counts_of(pair, pose.exp([*(-0.1 * done[:3, 3]), 0, 0, 0]) @ done)
-    assert before[OFF_PLANE + 8] > 0.9 * before[OFF_PLANE : OFF_PLANE + 9].sum()
+    assert before[OFF_BINS - 1] > 0.9 * before[:OFF_BINS].sum()
 
 
 def test_place_of_a_known_object_is_no_match(pair) -> None:
     _, _, done, sought = pair
-    assert counts_of(pair, done)[OFF_PLANE + 3 : OFF_PLANE + 6].sum() < 0.05
-    assert counts_of(pair, sought)[OFF_PLANE + 3 : OFF_PLANE + 6].sum() > 0.5
+    assert counts_of(pair, done)[MATCHED] < 0.05
+    assert counts_of(pair, sought)[MATCHED] > 0.5
 
 
 @pytest.mark.parametrize("mask", [np.zeros((4, 4), dtype=np.bool_), np.zeros((240, 320))])

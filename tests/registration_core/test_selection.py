@@ -8,7 +8,7 @@ from registration_core.agreement import Prior
 from registration_core.evidence import evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import chosen, is_settled, judge, leads, match_shares, shown_shares
+from registration_core.selection import chosen, judge, leads, match_shares, shown_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -112,18 +112,3 @@ def test_share_that_is_shown_is_that_of_the_outline_which_nothing_hides(scene) -
     assert whole > 0.97
     assert 0.3 < half < 0.7
     assert none == 0.0
-
-
-def test_a_good_start_is_settled_and_a_bad_one_is_not(scene) -> None:
-    model, grid, truth = scene
-    config = SnapConfig().selection
-    for start, settled in ((shifted(truth, x=0.002), True), (shifted(truth, x=0.05), False)):
-        candidates = to_rows(np.stack([start, truth if settled else start]))
-        assert (
-            is_settled(judged(candidates, model, grid, start_at(start), config), candidates, config)
-            is settled
-        )
-    far = to_rows(np.stack([shifted(truth, x=0.03), truth]))
-    judgement = judged(far, model, grid, start_at(shifted(truth, x=0.03)), config)
-    assert judgement.winner == 1
-    assert not is_settled(judgement, far, config)

@@ -1,5 +1,7 @@
 """One pose against several views: exact where they agree, and better than the worst of them."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -81,7 +83,9 @@ def test_one_view_is_a_snap(views) -> None:
 
 def test_steps_lead_to_the_estimate_in_the_world(views) -> None:
     start = pose.perturbed(T_WORLD_OBJECT, 0.06, np.radians(40), np.random.default_rng(0))
-    steps = list(snap_views_steps(tool(), views, start, rng=np.random.default_rng(0)))
+    rounds = tuple(dataclasses.replace(one, doubt=1.0) for one in SnapConfig().rounds)
+    config = SnapConfig(rounds=rounds)
+    steps = list(snap_views_steps(tool(), views, start, config, np.random.default_rng(0)))
     assert len(steps) > 2
     assert [step.iteration for step in steps] == list(range(1, len(steps) + 1))
     assert all(step.iteration <= step.iterations for step in steps)
@@ -89,13 +93,15 @@ def test_steps_lead_to_the_estimate_in_the_world(views) -> None:
     for step in steps:
         np.testing.assert_allclose(step.particles[0], step.T_camera_object, atol=1e-6)
         assert pose.distance(step.T_camera_object, T_WORLD_OBJECT).translation < 0.07
-    np.testing.assert_array_equal(steps[-1].estimate.T_world_object, run(views, start).T_world_object)
+    np.testing.assert_array_equal(
+        steps[-1].estimate.T_world_object, run(views, start, config=config).T_world_object
+    )
 
 
 def test_nothing_is_looked_for_where_the_start_fits_in_all_views(views) -> None:
     start = pose.perturbed(T_WORLD_OBJECT, 0.003, np.radians(2), np.random.default_rng(0))
-    (only,) = snap_views_steps(tool(), views, start, rng=np.random.default_rng(0))
-    assert pose.distance(only.estimate.T_world_object, T_WORLD_OBJECT).translation < 0.003
+    _, last = snap_views_steps(tool(), views, start, rng=np.random.default_rng(0))
+    assert pose.distance(last.estimate.T_world_object, T_WORLD_OBJECT).translation < 0.003
 
 
 def test_known_objects_are_left_out_of_the_view_that_shows_them(views) -> None:

@@ -1,0 +1,79 @@
+"""The softmax over candidates: finds the weights that choices were made by, within known signs."""
+
+import numpy as np
+
+from registration_core import evidence
+from registration_core.fitting.ranking import (
+    RIDGES,
+    Choice,
+    best_ridge,
+    fitted_weights,
+    judged_features,
+    signs,
+)
+
+F = evidence.COUNT + 2
+
+
+def choices_by(weights, trials=400, seed=0):
+    """Trials of random candidates in which the one is right that the weights make most of."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(trials):
+        features = np.zeros((12, F))
+        features[:, [0, evidence.MATCHED, F - 1]] = rng.uniform(0.0, 1.0, (12, 3))
+        right = np.zeros(12, np.bool_)
+        right[np.argmax(features @ weights)] = True
+        found.append(Choice(features, right))
+    return found
+
+
+def hits(choices, weights):
+    return np.mean([one.right[np.argmax(one.features @ weights)] for one in choices])
+
+
+def test_weights_choose_as_the_true_ones_do() -> None:
+    truth = np.zeros(F)
+    truth[[0, evidence.MATCHED, F - 1]] = -2.0, 5.0, 1.0
+    weights = fitted_weights(choices_by(truth), ridge=1e-4)
+    assert hits(choices_by(truth, seed=1), weights) > 0.97
+    assert weights[evidence.MATCHED] > 0 > weights[0]
+
+
+def test_known_signs_hold_whatever_the_data_say() -> None:
+    against_reason = np.zeros(F)
+    against_reason[[0, F - 1]] = 3.0, -3.0  # hidden pixels speak for a pose, nearness against it
+    weights = fitted_weights(choices_by(against_reason), 0.01)
+    for weight, (low, high) in zip(weights, signs(), strict=True):
+        assert (low is None or weight >= low) and (high is None or weight <= high)
+    assert weights[0] == 0.0 == weights[F - 1]
+
+
+def test_trials_without_a_right_or_a_wrong_candidate_say_nothing() -> None:
+    truth = np.zeros(F)
+    truth[evidence.MATCHED] = 4.0
+    choices = choices_by(truth)
+    none = Choice(choices[0].features, np.zeros(12, np.bool_))
+    every = Choice(choices[0].features, np.ones(12, np.bool_))
+    np.testing.assert_array_equal(
+        fitted_weights([*choices, none, every], 0.01), fitted_weights(choices, 0.01)
+    )
+
+
+def test_features_end_with_the_match_and_the_nearness() -> None:
+    counts = np.zeros((2, evidence.COUNT))
+    counts[0, evidence.MATCHED] = 1.0
+    features = judged_features(counts, np.array([0.5, 2.0]))
+    np.testing.assert_array_equal(features[:, -1], [-0.5, -2.0])
+    np.testing.assert_array_equal(features[:, -2], [1.0, 0.0])
+
+
+def test_a_strong_penalty_is_chosen_where_choices_are_noise_and_a_weak_one_where_they_are_not() -> None:
+    truth = np.zeros(F)
+    truth[[0, evidence.MATCHED, F - 1]] = -2.0, 5.0, 1.0
+    rng = np.random.default_rng(2)
+    folds = [np.arange(60) % 3 == fold for fold in range(3)]
+    lawful = choices_by(truth, trials=60)
+    noise = [Choice(one.features, rng.permutation(one.right)) for one in lawful]
+    assert best_ridge(lawful, folds) == RIDGES[0]
+    assert best_ridge(noise, folds) == RIDGES[-1]
