@@ -80,18 +80,20 @@ class Preparation:
     def _prepare_all(self) -> None:
         with self._database.read() as session:
             items = session.scalars(select(Object).order_by(Object.id.desc())).all()
-        for item in items:
+        for number, item in enumerate(items):
             if self._closed:
                 return
             if not self.is_prepared(item) and self.problem(item) is None:
-                self._prepare(item)
+                self._prepare(item, number < KNOWN_AHEAD)
         hashes = [self._hashes[key] for key in map(_key, items) if key in self._hashes]
-        self._snapper.hand_over(hashes[:KNOWN_AHEAD])
+        self._snapper.hand_over(hashes[:KNOWN_AHEAD])  # to workers that came meanwhile
 
-    def _prepare(self, item: Object) -> None:
+    def _prepare(self, item: Object, ahead: bool) -> None:
         try:
             model = self._data.model(item)
             self._snapper.built(model).result()
+            if ahead:
+                self._snapper.hand_over([model.content_hash])
         except ValueError as error:
             self._problems[_key(item)] = f"{item.name} cannot be snapped to: {error}."
         except Exception as error:  # a worker died, or cannot be reached: the next look tries again

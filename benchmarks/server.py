@@ -72,10 +72,10 @@ def prepare_state(state_dir: Path, datasets: Sequence[Path]) -> None:
 
 
 def sign_in_secrets(state_dir: Path, count: int) -> list[str]:
-    """Secrets of one-time links that sign in as many new operators."""
+    """Secrets of one-time links that sign in as many operators, who are made where they are not there."""
     with database_of(state_dir) as database:
         auth = Auth(database)
-        users = [auth.create_user(f"operator {number}", Role.OPERATOR) for number in range(1, count + 1)]
+        users = [auth.ensure_user(f"operator {number}", Role.OPERATOR) for number in range(1, count + 1)]
         return [auth.create_link(user.id) for user in users]
 
 

@@ -42,8 +42,7 @@ def test_what_is_there_is_built_kept_and_known_to_all_workers(services, preparat
     assert not any(map(preparation.is_prepared, objects_of(services)))
     preparation.start()
     wait_until_prepared(services)
-    for model_hash in hashes_of(services):
-        wait_until(lambda h=model_hash: knowing(services.snapper, h) == 2, "every worker to know it")
+    assert all(knowing(services.snapper, model_hash) == 2 for model_hash in hashes_of(services))
     files = {path.name.split(".")[0] for path in services.settings.prepared_dir.iterdir()}
     assert files == set(hashes_of(services))
 
