@@ -2,12 +2,15 @@
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.study_cli import study_cli
 from app.terminal import checked_database, console, fail, open_database, progress_bar, read_settings
+
+if TYPE_CHECKING:
+    from app.database import Database
 
 cli = typer.Typer(no_args_is_help=True, add_completion=False, help="Annotate 6-DoF object poses, with help.")
 token_cli = typer.Typer(no_args_is_help=True, help="API tokens for scripts and robots.")
@@ -105,25 +108,18 @@ def export_command(
     out: Annotated[Path, typer.Argument(help="Zip file to write.")],
 ) -> None:
     """Export the submitted poses of a dataset in BOP format, checked by reading them back."""
-    from sqlalchemy import select
-
     from app.export.job import export_dataset
     from app.storage import FileStore
-    from app.tables import Dataset
 
     settings = read_settings()
     database = checked_database(settings)
-    with database.read() as session:
-        row = session.scalar(select(Dataset).where(Dataset.name == dataset))
-        names = session.scalars(select(Dataset.name)).all()
-    if row is None:
-        fail(f"there is no dataset {dataset!r}; there are: {', '.join(names) or 'none'}")
+    dataset_id = _dataset_id(database, dataset)
     with progress_bar() as progress:
         task = progress.add_task("exporting", total=1.0)
         summary = export_dataset(
             database,
             FileStore(settings.files_dir),
-            row.id,
+            dataset_id,
             out,
             lambda share, what: progress.update(task, completed=share, description=what),
         )
@@ -131,6 +127,39 @@ def export_command(
         f"{out}: {summary.annotations} poses in {summary.images} images of {summary.scenes} scenes, read back"
         " and found right."
     )
+
+
+@cli.command("calibrate")
+def calibrate_command(
+    dataset: Annotated[str, typer.Argument(help="Name of the dataset.")],
+    reset: Annotated[bool, typer.Option("--reset", help="Go by the shipped calibration again.")] = False,
+) -> None:
+    """Calibrate the confidence by a dataset's own submitted registrations, and say what that gained."""
+    from app.calibrating import calibrate, experience_of, forget, keep, told
+    from app.scene_data import SceneData
+    from app.standards import Standards
+    from app.storage import FileStore
+
+    settings = read_settings()
+    database = checked_database(settings)
+    dataset_id = _dataset_id(database, dataset)
+    if reset:
+        with database.write() as session:
+            had_one = forget(session, dataset_id)
+        console.print(
+            f"Dataset {dataset} goes by the shipped calibration again."
+            if had_one
+            else f"Dataset {dataset} has no calibration of its own.",
+            markup=False,
+        )
+        return
+    known = experience_of(database, SceneData(FileStore(settings.files_dir)), dataset_id)
+    row, gains = calibrate(known, Standards(database, settings.risk).of(dataset_id).risk)
+    with database.write() as session:
+        keep(session, dataset_id, row)
+    for line in told(gains):
+        console.print(line, markup=False)
+    console.print(f"Snaps of dataset {dataset} go by this from now on; --reset takes it back.", markup=False)
 
 
 @token_cli.command("create")
@@ -170,6 +199,19 @@ def link_user(name: str) -> None:
     link = sign_in_link(settings, settings.port, auth.create_link(auth.user(name).id))
     console.print(f"User {name} may sign in, once, with this link:")
     console.print(link)
+
+
+def _dataset_id(database: "Database", name: str) -> int:
+    """The id of a dataset by its name."""
+    from sqlalchemy import select
+
+    from app.tables import Dataset
+
+    with database.read() as session:
+        ids = {row.name: row.id for row in session.scalars(select(Dataset))}
+    if name not in ids:
+        fail(f"there is no dataset {name!r}; there are: {', '.join(ids) or 'none'}")
+    return ids[name]
 
 
 def _role(name: str):  # type: ignore[no-untyped-def] # Role is imported late

@@ -9,6 +9,10 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 PROJECT = Path(__file__).resolve().parents[1]
 """Where `static`, `migrations` and `scenes` lie."""
 
+RISK = 0.05
+"""Share of wrong poses among those that the machine may accept by their confidence; certificates are asked for
+besides. The calibration that comes with the package bears out no less; one of a dataset's own may."""
+
 
 class Settings(BaseSettings):
     """What one running Snap6D needs to know; each field is an environment variable `SNAP6D_<FIELD>`."""
@@ -27,6 +31,8 @@ class Settings(BaseSettings):
     """Dask scheduler of a cluster; empty: worker processes on this machine."""
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     """Worker processes to start on this machine."""
+    risk: Annotated[float, Field(gt=0, lt=1)] = RISK
+    """Share of wrong poses among those that the machine may accept, where a dataset says nothing else."""
     max_upload_mb: Annotated[int, Field(ge=1)] = 4096
     """Largest dataset that may be uploaded, megabytes, packed and unpacked."""
     public_url: str = ""

@@ -96,7 +96,30 @@ class Dataset(Base):
     __tablename__ = "datasets"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(200), unique=True)
+    risk: Mapped[float | None] = mapped_column(Float)
+    """Share of wrong poses among those that the machine may accept; None: as the settings say."""
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    calibration: Mapped["CalibrationRow | None"] = relationship(back_populates="dataset")
+
+
+class CalibrationRow(Base):
+    """What a dataset's own registrations have taught of the confidence; a dataset has one at most."""
+
+    __tablename__ = "calibrations"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"), unique=True)
+    algorithm: Mapped[str] = mapped_column(String(12))
+    """Of the estimates: it says nothing of those of another one."""
+    stretch: Mapped[float] = mapped_column(Float)
+    shift: Mapped[float] = mapped_column(Float)
+    """Both of the log-odds."""
+    confidences: Mapped[list[Any]]
+    """Corrected ones, one for each registration."""
+    right: Mapped[list[Any]]
+    gains: Mapped[dict[str, Any]]
+    """What it gained, cross-validated, as it was printed."""
+    created_at: Mapped[datetime] = mapped_column(default=utc_now)
+    dataset: Mapped[Dataset] = relationship(back_populates="calibration")
 
 
 class Object(Base):
@@ -287,6 +310,9 @@ class EstimateRow(Base):
     covariance: Mapped[list[Any]]
     hypotheses: Mapped[list[Any]]
     ambiguities: Mapped[list[Any] | None]
+    certificates: Mapped[dict[str, Any] | None]
+    assessment: Mapped[dict[str, Any] | None]
+    """What the operator was told: verdict, reasons, and the confidence after the dataset's calibration."""
     converged: Mapped[bool]
     seed: Mapped[int] = mapped_column(BigInteger)
     config: Mapped[dict[str, Any]]

@@ -11,6 +11,7 @@ from registration_core.global_search import propose
 from registration_core.known_objects import explained_pixels
 from registration_core.object_model import ObjectModel, Symmetries
 from registration_core.problem import region_of_interest
+from registration_core.recalibration import Recalibration, recalibration
 from registration_core.snap import snap, snap_steps
 from registration_core.snap_config import SnapConfig
 from registration_core.symmetry_axes import axes_of, check_axes
@@ -30,6 +31,7 @@ __all__ = [
     "Hypothesis",
     "Intrinsics",
     "ObjectModel",
+    "Recalibration",
     "SnapConfig",
     "SnapStep",
     "SuggestedSymmetry",
@@ -45,6 +47,7 @@ __all__ = [
     "find_symmetries",
     "pose_from_correspondences",
     "propose",
+    "recalibration",
     "region_of_interest",
     "residual_of",
     "snap",

@@ -107,7 +107,7 @@ def acceptance(risk: float, calibration: Calibration | None = None) -> float:
     # Given the next confidence, the accepted ones are independent draws from above it: their errors are
     # binomial, and an upper Clopper-Pearson bound is below the risk where this p-value is below the level.
     passed = bdtr(wrong[counts - 1], counts, risk) <= level
-    strictest = np.log(level) / np.log1p(-risk)  # with fewer accepted ones none passes, even without an error
+    strictest = fewest(risk, level)
     ends = [
         end
         for start in (strictest, *(share * total for share in starts))
@@ -117,6 +117,11 @@ def acceptance(risk: float, calibration: Calibration | None = None) -> float:
         return NEVER
     accepted = counts[max(ends)]
     return float(np.nextafter(values[accepted], np.inf)) if accepted < total else 0.0
+
+
+def fewest(risk: float, delta: float = DELTA) -> float:
+    """Estimates below whose number no threshold can be borne out, even if all of them are right."""
+    return float(np.log(delta) / np.log1p(-risk))
 
 
 def _end_of_sequence(passed: NDArray[np.bool_], start: int) -> int:

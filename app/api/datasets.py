@@ -5,6 +5,7 @@ import tempfile
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from fastapi import APIRouter, HTTPException, Request
 from fastapi.concurrency import run_in_threadpool
@@ -20,6 +21,7 @@ from app.api.dependencies import (
     IdentityDep,
     LimitDep,
     Page,
+    ReviewerDep,
     ServicesDep,
     page_of,
     row_or_404,
@@ -28,7 +30,8 @@ from app.api.problems import InputError
 from app.archives import import_archive
 from app.auth import Identity
 from app.services import Services
-from app.tables import OUTSIDE_STUDIES, Dataset, Object, Registration, Scene, Task
+from app.tables import OUTSIDE_STUDIES, CalibrationRow, Dataset, Object, Registration, Scene, Task
+from registration_core.algorithm import ALGORITHM
 
 router = APIRouter(prefix="/api/datasets", tags=["datasets"])
 
@@ -53,6 +56,23 @@ UPLOAD_BODY = {
 }
 
 
+class CalibrationOut(BaseModel):
+    """What a dataset's own registrations have taught of the confidence."""
+
+    registrations: int
+    is_current: bool = Field(description="Whether it speaks of the snaps of this version; else it rests.")
+    stretch: float
+    shift: float = Field(description="Like `stretch` of the log-odds.")
+    gains: dict[str, Any] = Field(description="Before and after, cross-validated.")
+    created_at: datetime
+
+
+class Risk(BaseModel):
+    """Share of wrong poses among those that the machine may accept."""
+
+    risk: float | None = Field(gt=0, lt=1, allow_inf_nan=False, description="Null: as the settings say.")
+
+
 class DatasetOut(BaseModel):
     """A dataset and how far its work is."""
 
@@ -65,6 +85,8 @@ class DatasetOut(BaseModel):
     scenes: int
     tasks: int
     tasks_submitted: int
+    risk: float = Field(description="Share of wrong poses among those that the machine may accept.")
+    calibration: CalibrationOut | None = Field(description="Null where the shipped one is used.")
     created_at: datetime
 
 
@@ -80,6 +102,15 @@ def list_datasets(
 @router.get("/{dataset_id}")
 def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -> DatasetOut:
     """One dataset."""
+    with services.database.read() as session:
+        return _out(services, session, row_or_404(session, Dataset, dataset_id))
+
+
+@router.put("/{dataset_id}/risk")
+def set_risk(dataset_id: Id, body: Risk, services: ServicesDep, _identity: ReviewerDep) -> DatasetOut:
+    """Let the machine accept more or less; snaps from now on go by it."""
+    with services.database.write() as session:
+        row_or_404(session, Dataset, dataset_id).risk = body.risk
     with services.database.read() as session:
         return _out(services, session, row_or_404(session, Dataset, dataset_id))
 
@@ -120,6 +151,19 @@ def _take_in(file: UploadFile, services: Services, identity: Identity) -> Datase
     return get_dataset(summary.dataset_id, services, identity)
 
 
+def _calibration_out(row: CalibrationRow | None) -> CalibrationOut | None:
+    if row is None:
+        return None
+    return CalibrationOut(
+        registrations=len(row.confidences),
+        is_current=row.algorithm == ALGORITHM,
+        stretch=row.stretch,
+        shift=row.shift,
+        gains=row.gains,
+        created_at=row.created_at,
+    )
+
+
 def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
     tasks = (
         select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id, ~Task.is_for_studies)
@@ -141,5 +185,7 @@ def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
         scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
         tasks=session.scalar(tasks) or 0,
         tasks_submitted=session.scalar(submitted) or 0,
+        risk=services.settings.risk if row.risk is None else row.risk,
+        calibration=_calibration_out(row.calibration),
         created_at=row.created_at,
     )

@@ -3,6 +3,7 @@
 import numpy as np
 from pydantic import BaseModel, Field
 
+from app.labeling.assessment import Assessed, Assessment
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.seat import Seat
@@ -11,6 +12,18 @@ from app.labeling.tools import Tool
 from app.tables import Method, Pose
 from registration_core import pose
 from registration_core.depth_agreement import Verdict
+
+
+class AssessmentOut(BaseModel):
+    """What is to be thought of an estimate."""
+
+    verdict: Assessed
+    reasons: list[str] = Field(description="In words, the weightiest first.")
+    confidence: float = Field(description="After what the dataset's registrations have taught.")
+    risk: float = Field(description="Share of wrong poses among the accepted that the dataset allows.")
+    threshold: float | None = Field(
+        description="The confidence from which on that holds; null where none is known."
+    )
 
 
 class SnapOut(BaseModel):
@@ -30,7 +43,9 @@ class OfferOut(BaseModel):
     snap_id: str
     T_world_object: Pose
     confidence: float
+    assessment: AssessmentOut
     quiet: bool = Field(description="Nobody asked for it: it can be taken, and asks for no answer.")
+    withheld: str | None = Field(description="Why the object was not put there.")
 
 
 class LiveOut(BaseModel):
@@ -39,6 +54,7 @@ class LiveOut(BaseModel):
     T_world_object_start: Pose = Field(description="The pose that it would start from.")
     T_world_object: Pose
     confidence: float
+    assessment: AssessmentOut
 
 
 class SearchOut(BaseModel):
@@ -81,6 +97,8 @@ class RegistrationOut(BaseModel):
     T_world_object: Pose
     T_camera_object: Pose
     confidence: float | None
+    assessment: AssessmentOut | None
+    """What is to be thought of the estimate that the pose stems from."""
     can_undo: bool
     can_redo: bool
     dragging: bool
@@ -124,6 +142,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         T_world_object=state.T_world_object.tolist(),
         T_camera_object=(pose.inverse(T_world_camera) @ state.T_world_object).tolist(),
         confidence=state.confidence,
+        assessment=None if state.assessment is None else assessment_out(state.assessment),
         can_undo=state.can_undo,
         can_redo=state.can_redo,
         dragging=state.dragging,
@@ -143,6 +162,11 @@ def registration_out(seat: Seat) -> RegistrationOut:
         view_url=f"/view/{state.registration_id}/",
         view_open=seat.viewers > 0,
     )
+
+
+def assessment_out(assessment: Assessment) -> AssessmentOut:
+    """An assessment as JSON."""
+    return AssessmentOut(**assessment.stored())
 
 
 def _snap_out(state: SessionState) -> SnapOut | None:
@@ -183,7 +207,9 @@ def _offer_out(state: SessionState) -> OfferOut | None:
         snap_id=offer.snap_id,
         T_world_object=offer.T_world_object.tolist(),
         confidence=offer.confidence,
+        assessment=assessment_out(offer.assessment),
         quiet=offer.quiet,
+        withheld=offer.withheld,
     )
 
 
@@ -195,6 +221,7 @@ def _live_out(state: SessionState) -> LiveOut | None:
         T_world_object_start=live.T_world_object_start.tolist(),
         T_world_object=live.T_world_object.tolist(),
         confidence=live.confidence,
+        assessment=assessment_out(live.assessment),
     )
 
 

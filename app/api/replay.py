@@ -9,7 +9,9 @@ from pydantic import BaseModel, Field
 from app.analysis.pose_errors import PoseErrors, pose_errors
 from app.analysis.trace import SAMPLE_SECONDS, Trace
 from app.api.dependencies import Id, IdentityDep, ServicesDep
+from app.api.registration_state import AssessmentOut, assessment_out
 from app.api.tasks import Named
+from app.labeling.assessment import Assessed, Assessment
 from app.methods import method_of
 from app.replay.recording import Recording, ShownEvent
 from app.replay.replays import Replay
@@ -40,6 +42,7 @@ class TraceEvent(SpanOut):
     technique: str | None
     method: Method | None = Field(description="of a snap, what it was computed with")
     confidence: float | None
+    verdict: Assessed | None = Field(description="accept, look or doubt, as the operator was told")
 
 
 class Curve(BaseModel):
@@ -85,6 +88,7 @@ class GhostOut(BaseModel):
 
     T_world_object: Pose
     confidence: float
+    assessment: AssessmentOut | None
     on_offer: bool
 
 
@@ -105,6 +109,7 @@ class MomentOut(BaseModel):
     T_camera_object: Pose
     to_last: ToLast
     confidence: float | None
+    assessment: AssessmentOut | None
     frame_id: int
     ghost: GhostOut | None
 
@@ -160,11 +165,15 @@ def show_moment(body: NewMoment, services: ServicesDep, replay: ReplayDep) -> Mo
         T_camera_object=T_camera_object.tolist(),
         to_last=ToLast(translation=float(translation[0]), rotation=float(rotation[0])),
         confidence=moment.confidence,
+        assessment=_assessment_out(moment.assessment),
         frame_id=frame.id,
         ghost=None
         if ghost is None
         else GhostOut(
-            T_world_object=ghost.T_world_object.tolist(), confidence=ghost.confidence, on_offer=ghost.on_offer
+            T_world_object=ghost.T_world_object.tolist(),
+            confidence=ghost.confidence,
+            assessment=_assessment_out(ghost.assessment),
+            on_offer=ghost.on_offer,
         ),
     )
 
@@ -194,6 +203,7 @@ def _event_out(sequence: int, event: ShownEvent, span: SpanOut, method: Method |
         technique=event.detail.get("technique"),
         method=method,
         confidence=event.detail.get("confidence"),
+        verdict=event.detail.get("assessment", {}).get("verdict"),
     )
 
 
@@ -209,3 +219,7 @@ def _curve(trace: Trace, model: ObjectModel) -> Curve:
         translation=np.round(errors.translation, 5).tolist(),
         rotation=np.round(errors.rotation, 5).tolist(),
     )
+
+
+def _assessment_out(assessment: Assessment | None) -> AssessmentOut | None:
+    return None if assessment is None else assessment_out(assessment)

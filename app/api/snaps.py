@@ -9,6 +9,7 @@ from pydantic import BaseModel, Field
 
 from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
 from app.api.problems import InputError
+from app.api.registration_state import AssessmentOut
 from app.auth import Identity
 from app.labeling.start_spread import Unsaid
 from app.methods import method_of
@@ -60,7 +61,10 @@ class HypothesisOut(BaseModel):
     """One of the poses that fit the data."""
 
     T_camera_object: Pose
-    weight: float
+    weight: float = Field(description="Share of the belief among those that were found.")
+    chance: float | None = Field(
+        None, description="Of a proposal: how likely the object is there at all; null where not known."
+    )
 
 
 class AmbiguityOut(BaseModel):
@@ -70,6 +74,27 @@ class AmbiguityOut(BaseModel):
     motion: Literal["turn", "shift"]
     axis: tuple[float, float, float] = Field(description="Direction in the mesh's frame.")
     extent: float = Field(description="Radians or metres.")
+
+
+class CheckOut(BaseModel):
+    """What depth that the snap did not read says of its result."""
+
+    pixels: int = Field(description="Within the object's outline; 0 where none was left to check by.")
+    seen: float = Field(description="Share of them that was measured and is not hidden.")
+    match: float = Field(description="Share of the seen ones, like `behind` and `before`.")
+    behind: float = Field(description="Depth lies clearly behind the object.")
+    behind_by: float = Field(description="Metres.")
+    before: float = Field(description="Depth lies clearly before the object.")
+    before_by: float = Field(description="Metres.")
+
+
+class CertificatesOut(BaseModel):
+    """What speaks for an estimate beside its confidence."""
+
+    observably_correct: bool = Field(description="Depth that the snap did not read agrees with it.")
+    non_degenerate: bool = Field(description="No other pose fits as well, symmetric twins aside.")
+    check: CheckOut
+    unused: list[CheckOut] = Field(description="What each frame says that was not used.")
 
 
 class KnownObjectOut(BaseModel):
@@ -86,11 +111,15 @@ class EstimateOut(BaseModel):
     frame_id: int
     T_world_object: Pose
     T_camera_object: Pose
-    confidence: float
+    confidence: float = Field(description="As computed; `assessment` has it as the dataset taught it.")
     covariance: list[list[float]]
     hypotheses: list[HypothesisOut]
     ambiguities: list[AmbiguityOut] | None = Field(
         description="What depth does not tell about the pose; null where an older version did not say."
+    )
+    certificates: CertificatesOut | None = Field(description="Null where an older version had none.")
+    assessment: AssessmentOut | None = Field(
+        description="What the operator was told; null where an older version told nothing."
     )
     converged: bool
     seed: int
@@ -132,6 +161,7 @@ class SnapDetail(BaseModel):
     message: str | None
     standing: StandingOut | None
     """While it waits or runs."""
+    withheld: str | None = Field(description="Why its result was only offered.")
     estimate: EstimateOut | None
 
 
@@ -165,6 +195,7 @@ def get_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDe
             progress=1.0 if estimate else 0.0,
             message=outcome.detail.get("message"),
             standing=None,
+            withheld=outcome.detail.get("withheld"),
             estimate=_estimate_out(estimate) if estimate else None,
         )
     if live is not None and live.id == snap_id:
@@ -208,6 +239,7 @@ def _without_outcome(
         progress=progress,
         message=message,
         standing=standing,
+        withheld=None,
         estimate=None,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from sqlalchemy import select
 
 from app.auth import Identity, Role
+from app.config import RISK
 from app.database import Database
 from app.event_log import STATE_AFTER, EventLog, NewEvent
 from app.labeling.depth_reading import DepthReading, DepthView
@@ -28,6 +29,7 @@ from app.memory import give_back
 from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import Snapper
+from app.standards import Standards
 from app.tables import Condition, EstimateRow, Method, Object, Registration, Task
 
 logger = logging.getLogger(__name__)
@@ -41,13 +43,21 @@ class NotFoundError(Exception):
 
 
 class Desk:
-    """Opens sessions and keeps the live ones."""
+    """Opens sessions and keeps the live ones.
 
-    def __init__(self, database: Database, log: EventLog, data: SceneData, snapper: Snapper) -> None:
+    Args:
+        database, log, data, snapper: What sessions work with.
+        risk: Share of wrong poses among those that the machine may accept, where a dataset says nothing else.
+    """
+
+    def __init__(
+        self, database: Database, log: EventLog, data: SceneData, snapper: Snapper, risk: float = RISK
+    ) -> None:
         self._database = database
         self._log = log
         self._data = data
         self._snapper = snapper
+        self._standards = Standards(database, risk)
         self._seats: dict[int, Seat] = {}
         self._lock = threading.Lock()
 
@@ -197,7 +207,10 @@ class Desk:
             if event.kind in STATE_AFTER:
                 self._renew_scene(task.scene_id)
 
-        dispatch = Dispatch(self._snapper, self._data, frames, sought, neighbours)
+        dataset_id = task.scene.dataset_id
+        dispatch = Dispatch(
+            self._snapper, self._data, frames, sought, neighbours, lambda: self._standards.of(dataset_id)
+        )
         session = LabelingSession(
             registration_id=registration.id,
             history=replay(np.array(task.T_world_object_start), events),

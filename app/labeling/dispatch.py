@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import __version__
+from app.labeling.assessment import Standard, assess
 from app.labeling.neighbours import Neighbours
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session_object import SessionObject
@@ -30,6 +31,7 @@ class Dispatch:
         frames: The scene's frames, by id.
         sought: What is looked for.
         neighbours: Tells which pixels other objects explain.
+        standard: Tells what is asked of an estimate.
     """
 
     def __init__(
@@ -39,12 +41,14 @@ class Dispatch:
         frames: Mapping[int, Frame],
         sought: SessionObject,
         neighbours: Neighbours,
+        standard: Callable[[], Standard],
     ) -> None:
         self._snapper = snapper
         self._data = data
         self._frames = frames
         self._sought = sought
         self._neighbours = neighbours
+        self._standard = standard
 
     def snap(
         self,
@@ -61,8 +65,13 @@ class Dispatch:
                 on_end(SnapFailure(str(outcome)))
                 return
             T_world_object = T_world_camera @ outcome.estimate.T_camera_object
+            assessment = assess(outcome.estimate, self._standard(), sought.model)
             version = sought.symmetries_version
-            on_end(SnapResult(outcome.estimate, T_world_object, version, __version__, outcome.hardware))
+            on_end(
+                SnapResult(
+                    outcome.estimate, T_world_object, version, assessment, __version__, outcome.hardware
+                )
+            )
 
         try:
             job = self._snap_job(order, pose.inverse(T_world_camera) @ order.T_world_object, sought.model)

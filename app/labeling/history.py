@@ -2,10 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from app.labeling.assessment import Assessment, assessment_in
 
 NEW_POSE_KINDS = frozenset({"drag", "set_pose", "snap_applied", "accept", "reset"})
 """Events that put a new pose on top, and with it end what could be redone."""
@@ -19,7 +21,7 @@ class LoggedEvent(Protocol):
     @property
     def T_after(self) -> Sequence[Sequence[float]] | None: ...
     @property
-    def detail(self) -> dict[str, object]: ...
+    def detail(self) -> dict[str, Any]: ...
     @property
     def snap_id(self) -> str | None: ...
 
@@ -36,6 +38,8 @@ class Step:
     """Whether an operator dragged the object here from the step before."""
     snap_id: str | None = None
     """Of the estimate that the pose stems from."""
+    assessment: Assessment | None = None
+    """What was thought of that estimate; None also where an older version did not say."""
 
 
 @dataclass(frozen=True)
@@ -87,5 +91,6 @@ def replay(T_start: NDArray[np.float64], events: Iterable[LoggedEvent]) -> Histo
             confidence = event.detail.get("confidence")
             T = np.array(event.T_after, dtype=np.float64)
             known = None if confidence is None else float(str(confidence))
-            history = history.pushed(Step(T, known, event.kind == "drag", event.snap_id))
+            thought = assessment_in(event.detail)
+            history = history.pushed(Step(T, known, event.kind == "drag", event.snap_id, thought))
     return history

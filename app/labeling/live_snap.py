@@ -76,8 +76,7 @@ class LiveSnap:
 
 
 def _offer(order: SnapOrder, result: SnapResult) -> Offer:
-    confidence = result.estimate.confidence
-    return Offer(order.snap_id, order.T_world_object, result.T_world_object, confidence, quiet=True)
+    return Offer(order.snap_id, order.T_world_object, result.T_world_object, result.assessment, quiet=True)
 
 
 def _nothing() -> None:

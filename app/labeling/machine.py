@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from app.auth import Actor
 from app.event_log import NewEvent
+from app.labeling.assessment import Assessment
 from app.labeling.history import Step
 from app.labeling.live_snap import LiveSnap
 from app.labeling.same_pose import SamePose
@@ -24,14 +25,14 @@ from app.labeling.snap_exchange import (
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
 from app.labeling.tools import Tool, require, require_method
-from app.labeling.track import ActionError, Array, Track
+from app.labeling.track import ActionError, Array, Track, said_of
 from app.methods import method_of
 from app.tables import Method
 from registration_core import SnapConfig
 
-TAKE_OVER_CONFIDENCE = 0.9
-"""From here on the machine puts the object by itself, in `auto`. Confidence is calibrated: of ten poses that
-it takes over at least nine are right, and the tenth costs the operator one key."""
+MOVED_ON = "the object was moved meanwhile"
+TAKEN_BACK = "this pose was taken back before"
+"""Why a pose is only offered; else its assessment says it."""
 
 LIVE_SEED = 0
 """Always the same, so that the ghost of an object that rests does so, too."""
@@ -171,7 +172,7 @@ class Machine:
         """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
         look = self._live.found
         offer = look.offer if look else self._require_offer()
-        step = Step(offer.T_world_object, offer.confidence, snap_id=offer.snap_id)
+        step = _step(offer.T_world_object, offer.assessment, offer.snap_id)
         event = self._track.move_event("accept", actor, step, offer.snap_id)
         row = estimate_row(self._registration_id, look.order, look.result) if look else None
         self._track.push(event, step, row)
@@ -225,35 +226,42 @@ class Machine:
 
     def _take(self, order: SnapOrder, then: Step, result: SnapResult) -> None:
         assert self.status is not None
-        estimate, unasked = result.estimate, self.status.asked_by is Actor.MACHINE
+        unasked = self.status.asked_by is Actor.MACHINE
         moved = self._track.drag is not None or self._track.history.current is not then
-        applied = not moved and (not unasked or self._may_take_over(result))
+        withheld = MOVED_ON if moved else self._hesitates(result) if unasked else None
+        step = _step(result.T_world_object, result.assessment, order.snap_id)
         event = NewEvent(
-            kind="snap_applied" if applied else "snap_offered",
+            kind="snap_offered" if withheld else "snap_applied",
             actor=Actor.MACHINE,
             T_before=order.T_world_object.tolist(),
             T_after=result.T_world_object.tolist(),
             snap_id=order.snap_id,
-            duration_seconds=estimate.seconds,
-            detail={"confidence": estimate.confidence}
-            | ({"threshold": TAKE_OVER_CONFIDENCE} if unasked else {}),
+            duration_seconds=result.estimate.seconds,
+            detail=said_of(step) | ({"withheld": withheld} if withheld else {}),
         )
         row = estimate_row(self._registration_id, order, result)
-        if applied:
-            step = Step(result.T_world_object, estimate.confidence, snap_id=order.snap_id)
+        if withheld is None:
             self._track.push(event, step, row)
             self._taken_over += [result.T_world_object] if unasked else []
         else:
             self._track.record(event, row)
             self.offer = Offer(
-                order.snap_id, order.T_world_object, result.T_world_object, estimate.confidence, quiet=unasked
+                order.snap_id,
+                order.T_world_object,
+                result.T_world_object,
+                result.assessment,
+                unasked,
+                withheld,
             )
         self.status = replace(self.status, state="done", progress=1.0)
 
-    def _may_take_over(self, result: SnapResult) -> bool:
+    def _hesitates(self, result: SnapResult) -> str | None:
+        """Why the machine does not take over by itself; None where it does."""
+        if result.assessment.verdict != "accept":
+            return result.assessment.sentence
         # What the operator took back, by undo or by dragging on, is not forced on them again.
         taken_back = any(self._same_pose(result.T_world_object, T) for T in self._taken_over)
-        return result.estimate.confidence >= TAKE_OVER_CONFIDENCE and not taken_back
+        return TAKEN_BACK if taken_back else None
 
     def _fail(self, order: SnapOrder, message: str) -> None:
         assert self.status is not None
@@ -274,3 +282,7 @@ class Machine:
         if self.offer is None:
             raise ActionError("The machine offers no pose at present.")
         return self.offer
+
+
+def _step(T_world_object: Array, assessment: Assessment, snap_id: str) -> Step:
+    return Step(T_world_object, assessment.confidence, snap_id=snap_id, assessment=assessment)

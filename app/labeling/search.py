@@ -156,7 +156,11 @@ def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> N
         duration_seconds=outcome.seconds,
         detail={
             "candidates": [
-                {"T_camera_object": candidate.T_camera_object.tolist(), "weight": candidate.weight}
+                {
+                    "T_camera_object": candidate.T_camera_object.tolist(),
+                    "weight": candidate.weight,
+                    "chance": candidate.chance,
+                }
                 for candidate in outcome.hypotheses
             ],
             "version": outcome.version,

@@ -131,6 +131,7 @@ class LabelingSession:
                 frame_id=track.frame_id,
                 T_world_object=track.T_world_object,
                 confidence=None if track.drag else history.current.confidence,
+                assessment=None if track.drag else history.current.assessment,
                 can_undo=self._is_open and history.can_undo,
                 can_redo=self._is_open and history.can_redo,
                 dragging=track.drag is not None,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.labeling.assessment import Assessment
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.snap_exchange import Offer, SnapStatus
@@ -25,6 +26,8 @@ class SessionState:
     frame_id: int
     T_world_object: Array
     confidence: float | None
+    assessment: Assessment | None
+    """Of the estimate that the pose stems from."""
     can_undo: bool
     can_redo: bool
     dragging: bool

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.auth import Actor
+from app.labeling.assessment import Assessment
 from app.labeling.start_spread import StartSpread
 from app.tables import EstimateRow, Method
 from registration_core import Estimate, ObjectModel, SnapConfig
@@ -49,6 +50,7 @@ class SnapResult:
     T_world_object: Array
     symmetries_version: int
     """Of the object, that it was found with."""
+    assessment: Assessment
     version: str
     hardware: str
 
@@ -98,9 +100,16 @@ class Offer:
     T_world_object_start: Array
     """From where the machine looked."""
     T_world_object: Array
-    confidence: float
+    assessment: Assessment
     quiet: bool = False
     """Nobody asked for it: it is there to be taken, and asks for no answer."""
+    withheld: str | None = None
+    """Why the object was not put there."""
+
+    @property
+    def confidence(self) -> float:
+        """As the assessment has it."""
+        return self.assessment.confidence
 
 
 def stored_spread(spread: StartSpread | None) -> list[float] | None:
@@ -137,6 +146,8 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
             for mode in estimate.hypotheses
         ],
         ambiguities=[asdict(ambiguity) for ambiguity in estimate.ambiguities],
+        certificates=asdict(estimate.certificates),
+        assessment=result.assessment.stored(),
         converged=estimate.converged,
         seed=order.seed,
         config=order.config.to_dict(),

@@ -1,6 +1,6 @@
 """One registration's way: where the object is and was, each step of it written down before it counts."""
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,5 +73,11 @@ class Track:
             T_before=self.history.current.T_world_object.tolist(),
             T_after=step.T_world_object.tolist(),
             snap_id=snap_id,
-            detail={} if step.confidence is None else {"confidence": step.confidence},
+            detail=said_of(step),
         )
+
+
+def said_of(step: Step) -> dict[str, Any]:
+    """What the log keeps of the estimate that a step stems from."""
+    confidence = {} if step.confidence is None else {"confidence": step.confidence}
+    return confidence | ({} if step.assessment is None else {"assessment": step.assessment.stored()})

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.analysis.trace import LoggedEvent, Span, Trace, moves, trace_of
 from app.clock import SIMULATED
+from app.labeling.assessment import Assessment, assessment_in
 from app.labeling.viewpoint import Viewpoint, facing
 from app.tables import Pose
 
@@ -36,6 +37,7 @@ class Ghost:
     T_world_object: Array
     confidence: float
     on_offer: bool
+    assessment: Assessment | None
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Moment:
     T_world_object: Array
     confidence: float | None
     """Of the estimate that the pose stems from; None where a person set it."""
+    assessment: Assessment | None
+    """What was thought of that estimate."""
     frame_id: int
     ghost: Ghost | None
     viewpoint: Viewpoint | None
@@ -65,6 +69,7 @@ class Recording:
         self.trace: Trace = trace_of(T_world_object_start, events)
         self._frames = _Steps(frame_id)
         self._confidences: _Steps[float | None] = _Steps(None)
+        self._assessments: _Steps[Assessment | None] = _Steps(None)
         self._ghosts: _Steps[Ghost | None] = _Steps(None)
         cameras: list[tuple[Span, Array]] = []
         for event, span in zip(events, self.trace.spans, strict=True):
@@ -73,7 +78,9 @@ class Recording:
             if event.kind == "view":
                 cameras.append((span, _numbers_of(event.detail)))
             if moves(event):
-                self._confidences.set(span.start if event.path else span.end, event.detail.get("confidence"))
+                moved = span.start if event.path else span.end
+                self._confidences.set(moved, event.detail.get("confidence"))
+                self._assessments.set(moved, assessment_in(event.detail))
             self._note_ghost(event, span)
         self._cameras = _camera_knots(cameras)
 
@@ -87,6 +94,7 @@ class Recording:
         return Moment(
             T_world_object=self.trace.motion.at([seconds])[0],
             confidence=self._confidences.at(seconds),
+            assessment=self._assessments.at(seconds),
             frame_id=self._frames.at(seconds),
             ghost=self._ghosts.at(seconds),
             viewpoint=self._viewpoint_at(seconds),
@@ -96,7 +104,8 @@ class Recording:
         present = self._ghosts.last
         if event.kind in {"snap_offered", "snap_applied", "accept"}:
             T, confidence = np.array(event.T_after), float(event.detail["confidence"])
-            self._ghosts.set(span.end, Ghost(T, confidence, on_offer=event.kind == "snap_offered"))
+            offered = event.kind == "snap_offered"
+            self._ghosts.set(span.end, Ghost(T, confidence, offered, assessment_in(event.detail)))
         elif present is None:
             return
         elif event.kind == "drag":  # an offer stands until the drag ends, what the object left does not

@@ -49,7 +49,7 @@ function preparationText(dataset) {
   return [...doing, ...problems].join(" ");
 }
 
-function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted }) {
+function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted, calibration }) {
   const button = element("button", { type: "button", className: "dataset", "data-dataset-id": id });
   const most = Math.max(tasks, 1);
   button.append(
@@ -62,6 +62,7 @@ function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted }) 
     element("progress", { className: "human", max: most, value: submitted, "aria-label": "Submitted" }),
     element("small", {}, count(scenes, "scene")),
     element("small", { className: "dataset-preparation", role: "status" }),
+    ...(calibration ? [element("small", {}, calibrationText(calibration))] : []),
   );
   return button;
 }
@@ -72,6 +73,11 @@ function objectsLink({ id, name, objects, suggestions_open: open }) {
   link.setAttribute("aria-label", `Objects of ${name}`);
   if (open) link.append(" · ", icon("machine"), `${open} with suggested symmetries`);
   return link;
+}
+
+function calibrationText({ registrations, is_current: isCurrent }) {
+  const from = `calibrated from ${count(registrations, "registration")}`;
+  return isCurrent ? from : `${from} with an earlier version: calibrate again`;
 }
 
 function nothingImported(openImport) {

@@ -6,17 +6,17 @@ import { extentInPicture, shownCamera } from "./outline.js";
 const FILLED = 0.62; // share of the picture that the object takes, so that its surroundings are seen
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image
 
-/** Makes the card of {T_camera_object, T_world_object, weight}; `choose` and `take` are called with its place. */
+/** Makes the card of {T_camera_object, T_world_object, chance}; `choose` and `take` are called with its place. */
 export function candidateCard(candidate, index, frame, { choose, take }) {
-  const share = `${Math.round(100 * candidate.weight)} %`;
+  const chance = candidate.chance === null ? "" : `${Math.round(100 * candidate.chance)} %`;
   const canvas = element("canvas", { "aria-hidden": "true" });
   const image = element("img", { alt: "", draggable: false });
   if (frame.color_url) image.src = frame.color_url;
   const button = element(
     "button",
-    { type: "button", "aria-pressed": "false", "aria-label": `Candidate ${index + 1}, ${share}` },
+    { type: "button", "aria-pressed": "false", "aria-label": [`Candidate ${index + 1}`, chance].filter(Boolean).join(", ") },
     element("span", { className: "crop" }, image, canvas),
-    element("span", { className: "caption" }, element("strong", {}, index + 1), element("span", {}, share)),
+    element("span", { className: "caption" }, element("strong", {}, index + 1), element("span", {}, chance)),
   );
   button.addEventListener("click", () => choose(index));
   button.addEventListener("dblclick", () => take(index));

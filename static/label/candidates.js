@@ -142,7 +142,8 @@ function sourceOf({ state, search, offer, estimate_snap_id: snapId }) {
 
 function posesOf({ kind }, { candidates, frame_id: frameId, estimate }) {
   if (kind === "proposal") return { frame_id: frameId, poses: candidates.slice(0, MOST_FOUND) };
-  const poses = estimate.hypotheses.filter(({ weight }) => weight >= LEAST_WEIGHT);
+  const likely = estimate.hypotheses.filter(({ weight }) => weight >= LEAST_WEIGHT);
+  const poses = likely.map((one) => ({ ...one, chance: one.weight })); // one of them it is
   return { frame_id: estimate.frame_id, poses };
 }
 

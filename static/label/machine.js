@@ -2,6 +2,7 @@
  * What the machine does of its own accord: live snapping, taking over in `auto`, and what it suggests quietly.
  */
 
+import { drawAssessment } from "../assessment.js";
 import { byId, setText } from "../dom.js";
 import { MOD } from "./keys.js";
 import { possible } from "./panel.js";
@@ -47,17 +48,14 @@ export function machinePart(page) {
   return { title: "The machine", bindings, draw };
 }
 
-/** What there is to say in the view: {kind, text, confidence}, or null. */
-function noteFor({ state, offer, live, snap, confidence, dragging }) {
+/** What there is to say in the view: {kind, text, confidence, assessment}, or null. */
+function noteFor({ state, offer, live, snap, confidence, assessment, dragging }) {
   if (state !== "open") return null;
-  if (live) return { kind: "live", text: "A snap would land at the ghost", confidence: live.confidence };
-  if (offer) {
-    const text = "The machine suggests the ghost";
-    return offer.quiet ? { kind: "suggested", text, confidence: offer.confidence } : null;
-  }
+  if (live) return { kind: "live", text: "A snap would land at the ghost", ...live };
+  if (offer) return offer.quiet ? { kind: "suggested", text: "The machine suggests the ghost", ...offer } : null;
   const tookOver = snap?.state === "done" && snap.asked_by === "machine";
   if (!tookOver || confidence === null || dragging) return null;
-  return { kind: "taken", text: "The machine took over", confidence };
+  return { kind: "taken", text: "The machine took over", confidence, assessment };
 }
 
 function drawNote(note) {
@@ -69,6 +67,7 @@ function drawNote(note) {
   box.dataset.kind = note.kind;
   setText(byId("note-text"), `${note.text}, confidence `);
   setText(byId("note-confidence"), note.confidence.toFixed(2));
+  drawAssessment(byId("note-assessment"), note.assessment);
   byId("note-accept").hidden = note.kind === "taken";
   byId("note-undo").hidden = note.kind !== "taken";
 }

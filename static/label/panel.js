@@ -1,5 +1,6 @@
 /** Draws a registration into the panel; knows nothing of the server. */
 
+import { drawAssessment } from "../assessment.js";
 import { byId, icon, setText } from "../dom.js";
 import { hintFor } from "./hint.js";
 import { isSnapping, snappingText, waitingText } from "./waiting.js";
@@ -54,7 +55,8 @@ function drawSaved({ dragging }, connected) {
   setText(byId("saved-text"), !connected ? "offline" : dragging ? "moving…" : "saved");
 }
 
-function drawConfidence({ confidence, can_undo: moved }) {
+function drawConfidence({ confidence, assessment, can_undo: moved }) {
+  drawAssessment(byId("assessment"), assessment);
   const meter = byId("confidence");
   const known = confidence !== null;
   const text = known ? confidence.toFixed(2) : "–";
@@ -98,5 +100,7 @@ function snapStatus({ state, snap, offer, confidence, method, methods }) {
 
 function drawOffer({ offer, state }) {
   byId("offer").hidden = !offer || offer.quiet || state !== "open";
-  if (offer) setText(byId("offer-confidence"), offer.confidence.toFixed(2));
+  if (!offer) return;
+  setText(byId("offer-confidence"), offer.confidence.toFixed(2));
+  drawAssessment(byId("offer-assessment"), offer.assessment);
 }

@@ -66,12 +66,13 @@ function row(event, choose) {
 }
 
 /** "Drag · tx, rz · 1.2 s", "Snap applied · fast · 0.97 · 0.1 s". */
-function sentence({ kind, start, end, dof, technique, method, confidence }) {
+function sentence({ kind, start, end, dof, technique, verdict, method, confidence }) {
   const parts = [WORDS[kind] ?? kind.replaceAll("_", " ")];
   if (technique) parts.push(technique);
   if (method) parts.push(METHODS[method].name);
   if (kind === "drag" && dof) parts.push(dof.join(", "));
   if (confidence !== null) parts.push(confidence.toFixed(2));
+  if (verdict) parts.push(verdict);
   if (end - start >= 0.05) parts.push(`${(end - start).toFixed(1)} s`);
   return parts.join(" · ");
 }

@@ -5,6 +5,7 @@
  */
 
 import { get, post, put } from "../api.js";
+import { drawAssessment } from "../assessment.js";
 import { byId, icon, setText } from "../dom.js";
 import { setUpHelp } from "../label/help.js";
 import { imagePart } from "../label/image.js";
@@ -125,16 +126,18 @@ function showAt(seconds) {
 
 function drawMoment(moment) {
   image.draw(moment);
-  const { ghost, confidence, to_last: toLast } = moment;
+  const { ghost, confidence, assessment, to_last: toLast } = moment;
   byId("ghost").hidden = ghost === null;
   if (ghost) {
     setText(byId("ghost-text"), `${ghost.on_offer ? "Offered by the machine" : "Put here by the machine"}, confidence `);
     setText(byId("ghost-confidence"), ghost.confidence.toFixed(2));
+    drawAssessment(byId("ghost-assessment"), ghost.assessment);
   }
   const numbers = [`${(1000 * toLast.translation).toFixed(1)} mm`, `${(DEGREES * toLast.rotation).toFixed(1)}°`];
   setText(byId("distance"), `${numbers.join(" · ")} to the end`);
+  const thought = assessment ? `, ${assessment.verdict}` : "";
   const source = confidence === null ? "human" : "machine";
-  const words = confidence === null ? "posed by hand" : `posed by the machine, ${confidence.toFixed(2)}`;
+  const words = confidence === null ? "posed by hand" : `posed by the machine, ${confidence.toFixed(2)}${thought}`;
   byId("source").dataset.source = source;
   byId("source").replaceChildren(icon(source), words);
 }

@@ -1,14 +1,16 @@
 """The machine as a partner: it takes over in `auto`, shows a ghost while live, and stays away in `manual`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
+from sqlalchemy import select
 
-from app.labeling.machine import TAKE_OVER_CONFIDENCE
-from app.tables import Condition
-from registration_core import pose
+from app.config import Settings
+from app.database import Database
+from app.tables import CalibrationRow, Condition, Dataset
+from registration_core import ALGORITHM, pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import pull, wait_for_picture
 from tests.e2e.test_labelling import Desk
@@ -35,6 +37,27 @@ GIZMO_NEAR = """T => {
 """Whether the gizmo is where an object at this pose has it, whose origin is not far."""
 
 Open = Callable[[Condition], Desk]
+
+
+@pytest.fixture(autouse=True)
+def calibrated(server: Server) -> Iterator[None]:
+    """150 registrations have taught that the machine is right from a confidence of 0.5 on."""
+    database = Database(Settings(state_dir=server.state_dir).resolved_database_url)
+    taught = CalibrationRow(
+        algorithm=ALGORITHM,
+        stretch=1.0,
+        shift=0.0,
+        confidences=[*np.linspace(0.1, 0.49, 50), *np.linspace(0.5, 0.99, 150)],
+        right=[False] * 50 + [True] * 150,
+        gains={},
+    )
+    with database.write() as session:
+        taught.dataset_id = session.scalars(select(Dataset.id)).first()
+        session.add(taught)
+    yield
+    with database.write() as session:
+        session.delete(session.get_one(CalibrationRow, taught.id))
+    database.close()
 
 
 @pytest.fixture
@@ -71,7 +94,9 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) ->
     drag = desk.drag("tx", 0.01)
     (applied,) = desk.events("snap_applied")
     assert applied["actor"] == "machine"
-    assert applied["detail"]["confidence"] >= applied["detail"]["threshold"] == TAKE_OVER_CONFIDENCE
+    assessment = applied["detail"]["assessment"]
+    assert assessment["verdict"] == "accept"
+    assert applied["detail"]["confidence"] == assessment["confidence"] >= assessment["threshold"]
     (requested,) = desk.events("snap_requested")
     assert requested["actor"] == "machine"
     truth = true_pose(desk.task["object"]["obj_id"])
@@ -79,6 +104,8 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) ->
     said = f"The machine took over, confidence {applied['detail']['confidence']:.2f}."
     expect(page.locator("#note")).to_contain_text(said)
     expect(page.locator("#note-undo")).to_have_text("Undo Ctrl Z")
+    expect(page.locator("#note-assessment")).to_contain_text("accept: at most 2 % of poses that are as sure")
+    expect(page.locator("#assessment")).to_contain_text("accept: at most 2 %")
     take_picture(page, "label-taken-over")
     page.keyboard.press("Control+z")
     desk.events("undo")
@@ -99,6 +126,7 @@ def test_what_was_taken_back_in_auto_is_only_suggested(open_desk: Open) -> None:
     expect(page.locator("#note")).to_contain_text("The machine suggests the ghost")
     expect(page.locator("#offer")).to_be_hidden()
     desk.frame.wait_for_function(GHOST_SHOWN)
+    expect(page.locator("#note-assessment")).to_contain_text("accept")
     take_picture(page, "label-suggested")
     page.locator("#note-accept").click()
     (accepted,) = desk.events("accept")
@@ -165,3 +193,28 @@ def test_manual_shows_no_machine(open_desk: Open) -> None:
     page.keyboard.press("?")
     expect(page.locator("#key-list")).to_contain_text("Undo")
     expect(page.get_by_text("Snap", exact=True)).to_be_hidden()
+
+
+def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
+    desk = open_desk("snap")
+    page = desk.page
+    risk = f"{desk.root}/api/datasets/{desk.task['dataset']['id']}/risk"
+    assert page.request.put(risk, data={"risk": 0.0001}).ok  # which 200 registrations cannot bear out
+    page.keyboard.press("Space")
+    desk.events("snap_applied")
+    assessment = desk.state["assessment"]
+    assert page.request.put(risk, data={"risk": None}).ok
+    assert assessment["verdict"] == "look"
+    assert assessment["reasons"] == ["no confidence is known from which on at most 0.01 % are wrong"]
+    shown = page.locator("#assessment")
+    expect(shown).to_have_text(f"{assessment['verdict']}: {'; '.join(assessment['reasons'])}")
+    expect(shown.locator(".icon")).to_be_visible()
+    take_picture(page, "label-look")
+    page.request.post(f"{desk.url}/submit")
+    page.goto(f"{desk.root}/replay/{desk.state['id']}")
+    expect(page.locator("#ghost-assessment")).to_contain_text(assessment["reasons"][0])
+    expect(page.locator("#events")).to_contain_text(assessment["verdict"])
+    take_picture(page, "replay-look")
+    page.goto(desk.root)
+    expect(page.locator("#datasets")).to_contain_text("calibrated from 200 registrations")
+    take_picture(page, "home-calibrated")

@@ -122,11 +122,19 @@ def test_in_auto_the_end_of_a_drag_is_followed_by_the_machine(live: LiveServer, 
         ("snap_requested", "machine"),
     ]
     outcome = events[3]
-    sure = outcome["detail"]["confidence"] >= outcome["detail"]["threshold"]
+    assessment = outcome["detail"]["assessment"]
+    sure = assessment["verdict"] == "accept"
     assert outcome["kind"] == ("snap_applied" if sure else "snap_offered")
     state = admin.get(url).json()
     assert state["snap"]["asked_by"] == "machine"
     assert sure or state["offer"]["quiet"]
+    assert (state["assessment"] if sure else state["offer"]["assessment"]) == assessment
+    snap = admin.get(f"/api/snaps/{outcome['snap_id']}").json()
+    assert snap["estimate"]["assessment"] == assessment
+    assert snap["withheld"] == (
+        None if sure else f"{assessment['verdict']}: {'; '.join(assessment['reasons'])}"
+    )
+    assert snap["estimate"]["certificates"]["check"]["pixels"] >= 0
 
 
 def test_nobody_else_turns_it_on(live: LiveServer, looked: dict[str, Any]) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from app.event_log import NewEvent
+from app.labeling.assessment import Assessed, Assessment
 from app.labeling.history import History, Step
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession
@@ -109,7 +110,11 @@ CHECK = Check(pixels=400, seen=0.9, match=0.96, behind=0.01, behind_by=0.014, be
 SURE = Certificates(observably_correct=True, non_degenerate=True, check=CHECK, unused=())
 
 
-def result(T: np.ndarray, confidence: float = 0.9, certificates: Certificates = SURE) -> SnapResult:
+def thought(verdict: Assessed, confidence: float) -> Assessment:
+    return Assessment(verdict, ("because",), confidence, risk=0.02, threshold=0.8)
+
+
+def result(T: np.ndarray, confidence: float = 0.9, verdict: Assessed = "accept") -> SnapResult:
     estimate = Estimate(
         T_camera_object=T,
         confidence=confidence,
@@ -118,11 +123,11 @@ def result(T: np.ndarray, confidence: float = 0.9, certificates: Certificates = 
         seconds=0.25,
         evaluations=1234,
         converged=True,
-        certificates=certificates,
+        certificates=SURE,
         ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
     )
-    return SnapResult(estimate, T, 3, "1.2.3", "a test machine")
+    return SnapResult(estimate, T, 3, thought(verdict, confidence), "1.2.3", "a test machine")
 
 
 class Bench:

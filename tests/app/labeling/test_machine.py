@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from app.auth import Actor
-from app.labeling.machine import TAKE_OVER_CONFIDENCE
+from app.labeling.machine import MOVED_ON, TAKEN_BACK
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
 from registration_core import SnapConfig
-from tests.app.labeling.bench import START, Bench, result, shifted
+from tests.app.labeling.bench import START, Bench, result, shifted, thought
 
-SURE, UNSURE = TAKE_OVER_CONFIDENCE, TAKE_OVER_CONFIDENCE - 0.01
+SURE, UNSURE = 0.9, 0.7
 
 
 @pytest.fixture
@@ -58,31 +58,38 @@ def test_in_auto_the_machine_takes_over_at_the_end_of_a_drag_and_is_undone(auto)
     assert (drag.kind, drag.actor) == ("drag", Actor.HUMAN)
     assert (requested.kind, requested.actor) == ("snap_requested", Actor.MACHINE)
     assert (applied.kind, applied.actor) == ("snap_applied", Actor.MACHINE)
-    assert applied.detail == {"confidence": SURE, "threshold": TAKE_OVER_CONFIDENCE}
+    assert applied.detail == {"confidence": SURE, "assessment": thought("accept", SURE).stored()}
+    assert auto.state.assessment == thought("accept", SURE)
     assert len(auto.log.estimates) == 1
     auto.session.undo(Actor.HUMAN)
     assert np.array_equal(auto.state.T_world_object, shifted(0.1))
     assert len(auto.workers.snaps) == 1
 
 
-def test_an_unsure_machine_offers_quietly(auto):
+@pytest.mark.parametrize("verdict", ["look", "doubt"])
+def test_a_machine_that_is_not_to_be_accepted_offers_quietly_and_says_why(auto, verdict):
     auto.drag(shifted(0.1))
-    auto.workers.snaps[0].end(result(shifted(0.2), UNSURE))
+    auto.workers.snaps[0].end(result(shifted(0.2), UNSURE, verdict))
+    assert auto.state.offer.withheld == auto.log.events[-1].detail["withheld"] == f"{verdict}: because"
+    assert auto.state.offer.assessment.verdict == verdict
     assert np.array_equal(auto.state.T_world_object, shifted(0.1))
     assert auto.state.offer.quiet and auto.state.offer.confidence == UNSURE
     assert (auto.log.kinds[-1], auto.log.events[-1].actor) == ("snap_offered", Actor.MACHINE)
     auto.session.accept(Actor.HUMAN)
     assert np.array_equal(auto.state.T_world_object, shifted(0.2))
+    assert auto.state.assessment == thought(verdict, UNSURE)
+    assert auto.log.events[-1].detail["assessment"] == thought(verdict, UNSURE).stored()
 
 
 def test_what_the_operator_asks_for_is_taken_however_unsure_and_offered_aloud(auto):
     auto.session.snap(Actor.HUMAN)
-    auto.workers.snaps[0].end(result(shifted(0.2), UNSURE))
+    auto.workers.snaps[0].end(result(shifted(0.2), UNSURE, "doubt"))
     assert np.array_equal(auto.state.T_world_object, shifted(0.2))
     auto.session.snap(Actor.HUMAN)
     auto.session.undo(Actor.HUMAN)
-    auto.workers.snaps[1].end(result(shifted(0.3), UNSURE))
+    auto.workers.snaps[1].end(result(shifted(0.3), UNSURE, "doubt"))
     assert not auto.state.offer.quiet
+    assert auto.state.offer.withheld == MOVED_ON
 
 
 @pytest.mark.parametrize("undone", [True, False])
@@ -95,6 +102,7 @@ def test_what_the_operator_took_back_is_not_forced_on_them_again(auto, undone):
     auto.workers.snaps[1].end(result(shifted(0.201), SURE))
     assert np.array_equal(auto.state.T_world_object, shifted(0.15))
     assert auto.state.offer.quiet
+    assert auto.state.offer.withheld == TAKEN_BACK
     auto.drag(shifted(0.25))
     auto.workers.snaps[2].end(result(shifted(0.3), SURE))
     assert np.array_equal(auto.state.T_world_object, shifted(0.3))

@@ -1,6 +1,7 @@
 """Snaps as a session asks for them and takes what they bring, with workers held in hand."""
 
 from collections.abc import Callable
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from app.auth import Actor
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
 from registration_core import ALGORITHM, SnapConfig
-from tests.app.labeling.bench import FRAMES, PIVOT, START, Bench, result, shifted
+from tests.app.labeling.bench import FRAMES, PIVOT, START, SURE, Bench, result, shifted, thought
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 
@@ -37,13 +38,15 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     }
     assert (applied.kind, applied.actor, applied.snap_id) == ("snap_applied", Actor.MACHINE, snap_id)
     assert np.array_equal(applied.T_before, START) and np.array_equal(applied.T_after, shifted(0.05))
-    assert applied.detail == {"confidence": 0.8}
+    assert applied.detail == {"confidence": 0.8, "assessment": thought("accept", 0.8).stored()}
     (row,) = bench.log.estimates
     assert (row.snap_id, row.registration_id, row.frame_id, row.seed) == (snap_id, 7, FRAMES[0], 42)
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
     assert row.algorithm == ALGORITHM
     assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
+    assert row.confidence == 0.8 and row.assessment == thought("accept", 0.8).stored()
+    assert row.certificates == asdict(SURE) and row.certificates["check"]["match"] == 0.96
     (ambiguity,) = row.ambiguities
     assert ambiguity == {"kind": "free motion", "motion": "turn", "axis": (0.0, 0.0, 1.0), "extent": 0.4}
 
@@ -167,7 +170,8 @@ def test_an_offer_can_be_accepted_and_undone(bench):
     assert np.array_equal(bench.state.T_world_object, shifted(0.5))
     assert bench.state.confidence == 0.6 and bench.state.offer is None
     accept = bench.log.events[-1]
-    assert (accept.kind, accept.snap_id, accept.detail) == ("accept", snap_id, {"confidence": 0.6})
+    assert (accept.kind, accept.snap_id) == ("accept", snap_id)
+    assert accept.detail == {"confidence": 0.6, "assessment": thought("accept", 0.6).stored()}
     bench.session.undo(Actor.HUMAN)
     assert np.array_equal(bench.state.T_world_object, shifted(0.3))
 

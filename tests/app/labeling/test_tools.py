@@ -88,7 +88,7 @@ def test_a_trial_has_one_method_whatever_its_task_says():
         expected = ("paper",) if condition == "paper snap" else ("default",)
         assert methods_of(condition, True, "paper") == expected
         bench = Bench(condition=condition, in_study=True)
-        with pytest.raises(ActionError, match="method|by hand alone"):
+        with pytest.raises(ActionError, match=r"method|by hand alone"):
             bench.session.choose_method("default" if condition == "paper snap" else "paper")
 
 

@@ -1,0 +1,64 @@
+"""What is asked of an estimate before the machine may take over: the risk, and the confidence that bears it
+out.
+"""
+
+from functools import lru_cache
+
+from sqlalchemy import select
+
+from app.config import RISK
+from app.database import Database
+from app.labeling.assessment import Standard
+from app.tables import CalibrationRow, Dataset
+from registration_core import Recalibration, acceptance, calibration_of
+from registration_core.acceptance import NEVER, fewest
+from registration_core.algorithm import ALGORITHM
+
+
+class Standards:
+    """The standard of each dataset, as it is now.
+
+    Args:
+        database: Where risks and calibrations of datasets are kept.
+        risk: Where a dataset says nothing else.
+    """
+
+    def __init__(self, database: Database, risk: float = RISK) -> None:
+        self._database = database
+        self.risk = risk
+
+    def of(self, dataset_id: int) -> Standard:
+        """The standard of a dataset."""
+        with self._database.read() as session:
+            risk = session.scalar(select(Dataset.risk).where(Dataset.id == dataset_id))
+            row = session.execute(
+                select(CalibrationRow.id, CalibrationRow.created_at).where(
+                    CalibrationRow.dataset_id == dataset_id, CalibrationRow.algorithm == ALGORITHM
+                )
+            ).one_or_none()
+        risk = self.risk if risk is None else risk
+        return _shipped(risk) if row is None else self._calibrated(risk, *row)
+
+    @lru_cache(maxsize=256)  # noqa: B019 - there is one of it, as long as the application runs
+    def _calibrated(self, risk: float, calibration_id: int, _created_at: object) -> Standard:
+        with self._database.read() as session:
+            row = session.get_one(CalibrationRow, calibration_id)
+        return standard_of(row, risk)
+
+
+def standard_of(row: CalibrationRow, risk: float) -> Standard:
+    """The standard that a dataset's own calibration sets.
+
+    Where it is too small to bear the risk out, even if all were right, the threshold is the shipped one.
+    """
+    corrected = Recalibration(row.stretch, row.shift)
+    own = calibration_of(row.confidences, row.right, "the dataset's own registrations")
+    if len(own) >= fewest(risk, own.delta):
+        return Standard(risk, acceptance(risk, own), corrected)
+    shipped = acceptance(risk)
+    return Standard(risk, float(corrected(shipped)) if shipped <= 1.0 else NEVER, corrected)
+
+
+@lru_cache
+def _shipped(risk: float) -> Standard:
+    return Standard(risk, acceptance(risk))

@@ -1,0 +1,25 @@
+/** What is to be thought of an estimate: accept, look or doubt, and why; the words are the server's. */
+
+import { element, icon } from "./dom.js";
+
+const ICONS = { accept: "check", look: "look", doubt: "alert" };
+
+/** Shows an assessment in a node, which is hidden where there is none. */
+export function drawAssessment(node, assessment) {
+  const text = assessment ? sentenceOf(assessment) : "";
+  node.hidden = text === "";
+  if (node.dataset.text === text) return; // live regions stay quiet
+  node.dataset.text = text;
+  node.title = text;
+  if (!assessment) return;
+  const { verdict, reasons } = assessment;
+  node.dataset.verdict = verdict;
+  node.replaceChildren(
+    icon(ICONS[verdict]),
+    element("span", {}, element("strong", {}, verdict), `: ${reasons.join("; ")}`),
+  );
+}
+
+function sentenceOf({ verdict, reasons }) {
+  return `${verdict}: ${reasons.join("; ")}`;
+}
