@@ -10,8 +10,8 @@ PROJECT = Path(__file__).resolve().parents[1]
 """Where `static`, `migrations` and `scenes` lie."""
 
 RISK = 0.05
-"""Share of wrong poses among those that the machine may accept by their confidence; certificates are asked for
-besides. The calibration that comes with the package bears out no less; one of a dataset's own may."""
+"""Share of wrong poses among those that the machine may accept by their confidence; certificates are asked
+for besides. The calibration that comes with the package bears out no less; one of a dataset's own may."""
 
 
 class Settings(BaseSettings):
