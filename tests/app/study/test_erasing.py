@@ -73,4 +73,4 @@ def test_the_log_is_append_only_afterwards(database, interrupted):
             with pytest.raises(DBAPIError, match="append-only"), database.write() as session:
                 session.execute(statement)
     with database.read() as session:
-        assert session.scalar(text("SELECT count(*) FROM sqlite_master WHERE type = 'trigger'")) == 4
+        assert session.scalar(text("SELECT count(*) FROM sqlite_master WHERE type = 'trigger'")) == 6
