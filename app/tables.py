@@ -34,6 +34,8 @@ Condition = Literal[
 ]
 """What a task may be done with: no machine, one that is asked, one that does more when it is sure; or, where
 studies compare techniques, the gizmo, Snap, and this one. `paper snap` is Snap by the paper's filter."""
+FrameUse = Literal["auto", "current"]
+"""The frames that a snap uses: those that see the object, or the one that is shown alone."""
 Method = Literal["default", "paper"]
 """What a snap is computed with: the fast default, or the particle filter of the paper."""
 
@@ -320,6 +322,11 @@ class EstimateRow(Base):
     known_objects: Mapped[list[Any] | None]
     symmetries_version: Mapped[int | None]
     """Of the object's symmetries; None where an older version of Snap6D did not keep it."""
+    used_frames: Mapped[list[Any] | None]
+    """Ids of the frames that it was found in, best first; None where an older version did not say: `frame_id`
+    alone. The pose in camera axes and the covariance are of `frame_id`, used or not."""
+    other_frames: Mapped[list[Any] | None]
+    """What frames that were not used say of it; None where an older version did not ask."""
     version: Mapped[str] = mapped_column(String(40))
     algorithm: Mapped[str | None] = mapped_column(String(12))
     """`registration_core.ALGORITHM` where it was computed; None where an older version did not say."""

@@ -26,7 +26,7 @@ from registration_core import (
     ObjectModel,
     SnapConfig,
     propose,
-    snap_steps,
+    snap_views_steps,
 )
 from registration_core.compilation import warm_up
 from registration_core.viewpoint_model import ViewpointModel, build_viewpoint_model, packed, unpacked
@@ -58,15 +58,20 @@ class Job(ABC, Generic[Result]):
     topic: str
     """Where progress is told; empty where nobody asks."""
     model_hash: str
-    depth: NDArray[np.float32]
-    """(H, W), metres: the part of the image that may be looked at."""
-    camera: Intrinsics
-    """Of that part."""
     config: SnapConfig
 
     @abstractmethod
     def run(self, known: ViewpointModel, tell: Tell) -> Result:
         """Do it; raises ValueError where the job is bad."""
+
+
+@dataclass(frozen=True)
+class ImageJob(Job[Result]):
+    """A task that one image is enough for."""
+
+    depth: NDArray[np.float32]
+    """(H, W), metres."""
+    camera: Intrinsics
 
 
 @dataclass(frozen=True)
@@ -78,29 +83,44 @@ class JobResult:
 
 
 @dataclass(frozen=True)
+class JobView:
+    """What a job may look at of one frame."""
+
+    depth: NDArray[np.float32]
+    """(H, W), metres: the part of the image that may be looked at."""
+    camera: Intrinsics
+    """Of that part."""
+    T_shown_camera: NDArray[np.float64]
+    """(4, 4), where it stands, in the camera axes of the frame that is shown."""
+    explained: NDArray[np.bool_] | None
+    """(H, W), the pixels of other objects whose pose is known; None where there are none."""
+
+
+@dataclass(frozen=True)
 class SnapJob(Job[JobResult]):
-    """A snap."""
+    """A snap; its poses are in the camera axes of the frame that is shown, used or not."""
 
     seed: int
+    views: tuple[JobView, ...]
+    used: int
+    """The first so many views; the others are asked whether they agree."""
     T_camera_object: NDArray[np.float64]
     start_spread: tuple[float, float] | None
     """How far off T_camera_object may be, metres and radians; None where that is unknown."""
-    explained: NDArray[np.bool_] | None = None
-    """(H, W), the pixels of other objects whose pose is known; None where there are none."""
 
     def run(self, known: ViewpointModel, tell: Tell) -> JobResult:
-        """See `registration_core.snap`."""
+        """See `registration_core.snap_views`."""
         estimate = None
         rng = np.random.default_rng(self.seed)
-        for step in snap_steps(
+        for step in snap_views_steps(
             known,
-            self.depth,
-            self.camera,
+            [(view.depth, view.camera, view.T_shown_camera) for view in self.views],
             self.T_camera_object,
             self.config,
             rng,
             self.start_spread,
-            self.explained,
+            [view.explained for view in self.views],
+            self.used,
         ):
             tell(step.iteration / max(1, step.iterations))
             estimate = step.estimate
@@ -120,7 +140,7 @@ class Proposals:
 
 
 @dataclass(frozen=True)
-class SearchJob(Job[Proposals]):
+class SearchJob(ImageJob[Proposals]):
     """A search for the object, without a start."""
 
     seed: int

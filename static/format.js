@@ -21,3 +21,12 @@ export function fileSize(bytes) {
 export function taskName({ object, instance, instances }) {
   return instances > 1 ? `${object.name} #${instance + 1}` : object.name;
 }
+
+/** "3 frames", "3 frames, 2 of 2 others agree"; empty where there is one frame and nothing to add. */
+export function framesText(frames) {
+  if (!frames) return "";
+  const { used, agreeing, asked } = frames;
+  const others = asked === 0 ? "" : `${agreeing} of ${asked} ${asked === 1 ? "other agrees" : "others agree"}`;
+  if (used === 1 && !others) return "";
+  return [`${used} ${used === 1 ? "frame" : "frames"}`, others].filter(Boolean).join(", ");
+}

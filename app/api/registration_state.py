@@ -1,5 +1,7 @@
 """A live session as JSON: what a page or a script may know of a registration at one moment."""
 
+from dataclasses import asdict
+
 import numpy as np
 from pydantic import BaseModel, Field
 
@@ -9,7 +11,7 @@ from app.labeling.layers import Layers
 from app.labeling.seat import Seat
 from app.labeling.session_state import SessionState
 from app.labeling.tools import Tool
-from app.tables import Method, Pose
+from app.tables import FrameUse, Method, Pose
 from registration_core import pose
 from registration_core.depth_agreement import Verdict
 
@@ -26,6 +28,17 @@ class AssessmentOut(BaseModel):
     )
 
 
+class FramesReportOut(BaseModel):
+    """What frames had to do with the result of a snap."""
+
+    used: int
+    """So many it was found in."""
+    agreeing: int
+    """So many others agree with it, ..."""
+    asked: int
+    """... of those that see enough of the object to tell."""
+
+
 class SnapOut(BaseModel):
     """The last snap of a registration."""
 
@@ -35,6 +48,8 @@ class SnapOut(BaseModel):
     progress: float
     message: str | None
     method: Method
+    frames: FramesReportOut | None
+    """Once it is done."""
 
 
 class OfferOut(BaseModel):
@@ -91,6 +106,10 @@ class RegistrationOut(BaseModel):
     """What Snap computes with where it is not asked otherwise."""
     methods: list[Method]
     """What it may compute with."""
+    frame_use: FrameUse
+    """The frames that Snap uses where it is not asked otherwise."""
+    frame_uses: list[FrameUse]
+    """Those that it may use."""
     state: str
     skip_reason: str | None
     frame_id: int
@@ -136,6 +155,8 @@ def registration_out(seat: Seat) -> RegistrationOut:
         tools=sorted(seat.session.tools),
         method=state.method,
         methods=list(seat.session.methods),
+        frame_use=state.frame_use,
+        frame_uses=list(seat.session.frame_uses),
         state=state.state,
         skip_reason=state.skip_reason,
         frame_id=state.frame_id,
@@ -180,6 +201,7 @@ def _snap_out(state: SessionState) -> SnapOut | None:
         progress=snap.progress,
         message=snap.message,
         method=snap.method,
+        frames=None if snap.frames is None else FramesReportOut(**asdict(snap.frames)),
     )
 
 

@@ -25,7 +25,7 @@ from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Actor
 from app.labeling.layers import Layers
 from app.labeling.session import LabelingSession
-from app.tables import Event, Method, Pose
+from app.tables import Event, FrameUse, Method, Pose
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
@@ -61,6 +61,12 @@ class MethodChoice(BaseModel):
     """What Snap is to compute with."""
 
     method: Method
+
+
+class FramesChoice(BaseModel):
+    """The frames that Snap is to use."""
+
+    frames: FrameUse
 
 
 class Skip(BaseModel):
@@ -121,6 +127,13 @@ def set_live(body: LiveChoice, seat: SeatDep, identity: AnyoneDep) -> Registrati
 def choose_method(body: MethodChoice, seat: SeatDep) -> RegistrationOut:
     """Choose what Snap computes with; live snapping, `auto` and the search stay with the default."""
     seat.session.choose_method(body.method)
+    return registration_out(seat)
+
+
+@router.put("/{registration_id}/snap-frames")
+def choose_frames(body: FramesChoice, seat: SeatDep) -> RegistrationOut:
+    """Choose the frames that Snap uses: those that see the object, or the one that is shown alone."""
+    seat.session.choose_frames(body.frames)
     return registration_out(seat)
 
 

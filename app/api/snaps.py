@@ -14,7 +14,7 @@ from app.auth import Identity
 from app.labeling.start_spread import Unsaid
 from app.methods import method_of
 from app.services import Services
-from app.tables import EstimateRow, Event, Method, Pose
+from app.tables import EstimateRow, Event, FrameUse, Method, Pose
 from registration_core import SnapConfig
 
 router = APIRouter(prefix="/api", tags=["snaps"])
@@ -29,6 +29,10 @@ OUTCOMES: dict[str, SnapState] = {
 }
 INTERRUPTED = "The server stopped while this snap ran. Nothing is lost; ask for another one."
 
+MOST_FRAMES = 8
+"""That a snap may be asked to use: each costs time."""
+
+FrameId = Annotated[int, Field(ge=1, le=2**31 - 1)]
 Metres = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Radians = Annotated[float, Field(ge=0, le=pi, allow_inf_nan=False)]
 
@@ -48,6 +52,12 @@ class NewSnap(BaseModel):
         description="How far off the present pose may be, metres and radians; null where that is unknown. "
         "Left out, it is told from the last drags.",
         examples=[[0.03, 0.35]],
+    )
+    frames: FrameUse | Annotated[list[FrameId], Field(min_length=1, max_length=MOST_FRAMES)] | None = Field(
+        None,
+        description="The frames that it uses: those that see the object best, the one that is shown, "
+        "or these; where null, as is chosen.",
+        examples=["auto"],
     )
 
 
@@ -105,6 +115,17 @@ class KnownObjectOut(BaseModel):
     T_world_object: Pose
 
 
+class FrameCheckOut(BaseModel):
+    """What a frame says of a pose that was found without it."""
+
+    frame_id: int
+    share: float | None = Field(
+        description="Of the object's pixels that are seen, of those that match; null where too few are "
+        "seen to tell."
+    )
+    agrees: bool | None
+
+
 class EstimateOut(BaseModel):
     """What a snap found."""
 
@@ -131,6 +152,12 @@ class EstimateOut(BaseModel):
     )
     symmetries_version: int | None = Field(
         description="Of the object's symmetries; null where an older version did not keep it."
+    )
+    used_frames: list[int] | None = Field(
+        description="Frames that it was found in, best first; null where an older version did not say: one."
+    )
+    other_frames: list[FrameCheckOut] | None = Field(
+        description="What frames that were not used say of it; null where an older version did not ask."
     )
     version: str
     algorithm: str | None = Field(
@@ -168,14 +195,17 @@ class SnapDetail(BaseModel):
 @router.post("/registrations/{registration_id}/snaps", status_code=202)
 def request_snap(seat: SeatDep, identity: AnyoneDep, body: NewSnap | None = None) -> SnapId:
     """Ask the machine for a better pose from the present one."""
-    wanted = body or NewSnap(seed=None, config=None)
+    wanted = body or NewSnap(seed=None, config=None, frames=None)
     try:
         config = SnapConfig.from_dict({"preset": seat.session.method, **(wanted.config or {})})
     except ValueError as error:
         raise InputError(f"body.{error}.") from error
     given = "start_spread" in wanted.model_fields_set
     spread = wanted.start_spread if given else Unsaid.FROM_DRAGS
-    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed, spread))
+    frames = tuple(dict.fromkeys(wanted.frames)) if isinstance(wanted.frames, list) else wanted.frames
+    if config.method == "particle_filter" and isinstance(frames, tuple) and len(frames) > 1:
+        raise InputError("body.frames must name one frame: the paper's filter knows one view.")
+    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed, spread, frames))
 
 
 @router.get("/snaps/{snap_id}")

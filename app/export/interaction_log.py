@@ -26,7 +26,7 @@ MATRIX = pa.list_(pa.list_(pa.float64()))
 TIME = pa.timestamp("us", tz="UTC")
 JSON_TEXT = pa.string()
 
-LOOSE_FIELDS = ("detail", "hypotheses", "ambiguities", "config", "known_objects")
+LOOSE_FIELDS = ("detail", "hypotheses", "ambiguities", "config", "known_objects", "other_images")
 """Without a fixed shape."""
 
 CONTEXT_FIELDS = [
@@ -81,6 +81,8 @@ ESTIMATES = pa.schema(
         ("start_spread", pa.list_(pa.float64())),
         ("known_objects", JSON_TEXT),
         ("symmetries_version", pa.int64()),
+        ("used_images", pa.list_(pa.int64())),
+        ("other_images", JSON_TEXT),
         ("version", pa.string()),
         ("algorithm", pa.string()),
         ("hardware", pa.string()),
@@ -206,11 +208,26 @@ def estimate_record(
         "start_spread": estimate.start_spread,
         "known_objects": estimate.known_objects,
         "symmetries_version": estimate.symmetries_version,
+        **image_records(estimate, {one.id: one.image_id for one in scene.frames}),
         "version": estimate.version,
         "algorithm": estimate.algorithm,
         "hardware": estimate.hardware,
         "seconds": estimate.seconds,
         "evaluations": estimate.evaluations,
+    }
+
+
+def image_records(estimate: EstimateRow, image_ids: dict[int, int]) -> Record:
+    """The images that an estimate was found in, and what others say of it; None as in the estimate."""
+    used, others = estimate.used_frames, estimate.other_frames
+    return {
+        "used_images": None if used is None else [image_ids[frame_id] for frame_id in used],
+        "other_images": None
+        if others is None
+        else [
+            {"image_id": image_ids[one["frame_id"]], "share": one["share"], "agrees": one["agrees"]}
+            for one in others
+        ],
     }
 
 

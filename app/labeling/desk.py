@@ -23,6 +23,7 @@ from app.labeling.seat import Seat
 from app.labeling.session import LabelingSession
 from app.labeling.session_object import SessionObject
 from app.labeling.session_state import SessionState
+from app.labeling.snap_frames import FramesOfScene
 from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
 from app.memory import give_back
@@ -207,6 +208,7 @@ class Desk:
             if event.kind in STATE_AFTER:
                 self._renew_scene(task.scene_id)
 
+        scene_frames = FramesOfScene(self._data, frames, task.object)
         dataset_id = task.scene.dataset_id
         dispatch = Dispatch(
             self._snapper, self._data, frames, sought, neighbours, lambda: self._standards.of(dataset_id)
@@ -225,6 +227,7 @@ class Desk:
             skip_reason=registration.skip_reason,
             known_objects=lambda: neighbours.known,
             request_search=dispatch.search,
+            choose_frames=scene_frames.choose,
             now=self._log.clock.monotonic,
             in_study=is_trial(registration),
             method=cast(Method, task.method),

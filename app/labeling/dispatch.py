@@ -14,7 +14,7 @@ from app.labeling.snap_exchange import SnapFailure, SnapOrder, SnapResult
 from app.scene_data import SceneData, camera_of
 from app.snapping import SnapError, Snapper
 from app.tables import Frame
-from app.worker import JobResult, Proposals, SearchJob, SnapJob
+from app.worker import JobResult, JobView, Proposals, SearchJob, SnapJob
 from registration_core import ObjectModel, pose
 from registration_core.problem import region_of_interest
 
@@ -74,7 +74,7 @@ class Dispatch:
             )
 
         try:
-            job = self._snap_job(order, pose.inverse(T_world_camera) @ order.T_world_object, sought.model)
+            job = self._snap_job(order, sought.model)
         except ValueError as error:
             on_end(SnapFailure(f"The snap cannot work on this: {error}."))
             return lambda: None
@@ -99,28 +99,42 @@ class Dispatch:
         model = self._sought.present.model
         return self._snapper.request(self._search_job(order, model), model, on_progress, ended)
 
-    def _snap_job(
-        self, order: SnapOrder, T_camera_object: NDArray[np.float64], model: ObjectModel
-    ) -> SnapJob:
-        frame = self._frames[order.frame_id]
-        explained = self._neighbours.explained(frame, order.known)
-        camera = camera_of(frame)
-        whole = self._data.depth(frame)
-        left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
-        if not whole[top : top + height, left : left + width].any():
-            left, top, (height, width) = 0, 0, whole.shape  # nothing near is no error, nothing seen at all is
-        rows, columns = slice(top, top + height), slice(left, left + width)
+    def _snap_job(self, order: SnapOrder, model: ObjectModel) -> SnapJob:
+        T_shown_world = pose.inverse(np.array(self._frames[order.frame_id].T_world_camera))
         return SnapJob(
             snap_id=order.snap_id,
             topic="" if order.is_live else self._snapper.topic,
             model_hash=model.content_hash,
-            depth=np.ascontiguousarray(whole[rows, columns]),
-            camera=camera.cropped(left, top, width, height),
-            explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
-            T_camera_object=T_camera_object,
             config=order.config,
             seed=order.seed,
+            views=tuple(
+                self._view(order, self._frames[frame_id], T_shown_world, model)
+                for frame_id in (*order.frames.used, *order.frames.others)
+            ),
+            used=len(order.frames.used),
+            T_camera_object=T_shown_world @ order.T_world_object,
             start_spread=order.start_spread,
+        )
+
+    def _view(
+        self, order: SnapOrder, frame: Frame, T_shown_world: NDArray[np.float64], model: ObjectModel
+    ) -> JobView:
+        explained = self._neighbours.explained(frame, order.known)
+        camera, T_world_camera = camera_of(frame), np.array(frame.T_world_camera)
+        T_camera_object = pose.inverse(T_world_camera) @ order.T_world_object
+        whole = self._data.depth(frame)
+        try:
+            left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
+        except ValueError as error:
+            raise ValueError(f"frame {frame.image_id}: {error}") from error
+        if not whole[top : top + height, left : left + width].any():
+            left, top, (height, width) = 0, 0, whole.shape  # nothing near is no error, nothing seen at all is
+        rows, columns = slice(top, top + height), slice(left, left + width)
+        return JobView(
+            depth=np.ascontiguousarray(whole[rows, columns]),
+            camera=camera.cropped(left, top, width, height),
+            T_shown_camera=np.eye(4) if frame.id == order.frame_id else T_shown_world @ T_world_camera,
+            explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
         )
 
     def _search_job(self, order: SearchOrder, model: ObjectModel) -> SearchJob:

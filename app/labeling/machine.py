@@ -2,7 +2,7 @@
 
 import secrets
 import uuid
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from app.auth import Actor
@@ -12,22 +12,27 @@ from app.labeling.history import Step
 from app.labeling.live_snap import LiveSnap
 from app.labeling.same_pose import SamePose
 from app.labeling.snap_exchange import (
+    ChooseFrames,
     KnownObject,
     Offer,
     RequestSnap,
     SnapFailure,
+    SnapFrames,
     SnapOrder,
     SnapResult,
     SnapStatus,
+    Wanted,
     estimate_row,
+    frames_report,
     stored_known,
+    stored_others,
     stored_spread,
 )
 from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
-from app.labeling.tools import Tool, require, require_method
+from app.labeling.tools import Tool, require, require_frames, require_method
 from app.labeling.track import ActionError, Array, Track, said_of
 from app.methods import method_of
-from app.tables import Method
+from app.tables import FrameUse, Method
 from registration_core import SnapConfig
 
 MOVED_ON = "the object was moved meanwhile"
@@ -50,6 +55,7 @@ class Machine:
         takes_turns: Whether it looks for a better pose whenever the operator lets go.
         same_pose: Tells whether the operator has seen a result before.
         request_snap: Hands an order to the workers.
+        choose_frames: Chooses the frames of a snap.
         known_objects: Tells what is known of other objects in the scene.
     """
 
@@ -59,18 +65,22 @@ class Machine:
         track: Track,
         tools: Collection[Tool],
         methods: Collection[Method],
+        frame_uses: Sequence[FrameUse],
         takes_turns: bool,
         same_pose: SamePose,
         request_snap: RequestSnap,
+        choose_frames: ChooseFrames,
         known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
         self._registration_id = registration_id
         self._track = track
         self._tools = tools
         self._methods = methods
+        self._frame_uses = frame_uses
         self._takes_turns = takes_turns
         self._same_pose = same_pose
         self._request_snap = request_snap
+        self._choose_frames = choose_frames
         self._known_objects = known_objects
         self._cancel: Callable[[], None] | None = None
         self._live = LiveSnap(request_snap)
@@ -79,16 +89,26 @@ class Machine:
         self.status: SnapStatus | None = None
         """Of the last snap."""
         self.offer: Offer | None = None
+        self.frame_use = frame_uses[0]
+        """The frames that a snap uses where it is not asked otherwise."""
 
     def snap(
-        self, actor: Actor, config: SnapConfig, seed: int | None, start_spread: StartSpread | Unsaid | None
+        self,
+        actor: Actor,
+        config: SnapConfig,
+        seed: int | None,
+        start_spread: StartSpread | Unsaid | None,
+        frames: Wanted | None = None,
     ) -> str:
         """Ask the workers for a better pose; returns the snap's id. See `LabelingSession.snap`."""
         require(self._tools, "snap")
         method = method_of(config.to_dict())
         require_method(self._methods, method)
+        wanted = frames or self.frame_use
+        require_frames(self._frame_uses, wanted)
         self.abandon(actor, "superseded")
         order = self._order(config, seed, start_spread)
+        order = replace(order, frames=self._frames_of(order, wanted))
         self._track.record(
             NewEvent(
                 kind="snap_requested",
@@ -100,6 +120,8 @@ class Machine:
                     "config": order.config.to_dict(),
                     "start_spread": stored_spread(order.start_spread),
                     "frame_id": order.frame_id,
+                    "used_frames": list(order.frames.used),
+                    "other_frames": list(order.frames.others),
                     "known_objects": stored_known(order.known),
                 },
             )
@@ -197,12 +219,18 @@ class Machine:
         return SnapOrder(
             snap_id=uuid.uuid4().hex,
             frame_id=self._track.frame_id,
+            frames=SnapFrames((self._track.frame_id,)),
             T_world_object=history.current.T_world_object,
             config=config,
             seed=secrets.randbelow(2**31) if seed is None else seed,
             start_spread=start_spread,
             known=self._known_objects(),
         )
+
+    def _frames_of(self, order: SnapOrder, wanted: Wanted) -> SnapFrames:
+        if order.config.method == "particle_filter" and wanted == "auto":
+            wanted = "current"  # the paper's filter knows one view
+        return self._choose_frames(order.frame_id, order.T_world_object, order.known, wanted)
 
     def _progressed(self, snap_id: str, share: float) -> None:
         if self._is_current(snap_id):
@@ -237,7 +265,12 @@ class Machine:
             T_after=result.T_world_object.tolist(),
             snap_id=order.snap_id,
             duration_seconds=result.estimate.seconds,
-            detail=said_of(step) | ({"withheld": withheld} if withheld else {}),
+            detail=said_of(step)
+            | {
+                "used_frames": list(order.frames.used),
+                "other_frames": stored_others(order, result.estimate),
+            }
+            | ({"withheld": withheld} if withheld else {}),
         )
         row = estimate_row(self._registration_id, order, result)
         if withheld is None:
@@ -253,7 +286,8 @@ class Machine:
                 unasked,
                 withheld,
             )
-        self.status = replace(self.status, state="done", progress=1.0)
+        report = frames_report(order, result.estimate)
+        self.status = replace(self.status, state="done", progress=1.0, frames=report)
 
     def _hesitates(self, result: SnapResult) -> str | None:
         """Why the machine does not take over by itself; None where it does."""

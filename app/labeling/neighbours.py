@@ -26,7 +26,9 @@ class Neighbours:
         self._read = read
         self._data = data
         self._listeners: list[Listener] = []
-        self._explained: tuple[int, tuple[KnownObject, ...], NDArray[np.bool_]] | None = None
+        self._explained: dict[int, NDArray[np.bool_]] = {}
+        """By frame, for what was known last."""
+        self._explained_by: tuple[KnownObject, ...] = ()
         self.shown = True
         """Whether the 3-D view shows what is done; snaps know it all the same."""
         self.things = read()
@@ -52,13 +54,13 @@ class Neighbours:
         """The pixels (H, W) of a frame that known objects explain; None where nothing is known."""
         if not known:
             return None
-        kept = self._explained
-        if kept is None or kept[0] != frame.id or kept[1] is not known:
+        if self._explained_by is not known:
+            self._explained, self._explained_by = {}, known
+        if frame.id not in self._explained:
             T_camera_world = pose.inverse(np.array(frame.T_world_camera))
             placed = [(one.model, T_camera_world @ one.T_world_object) for one in known]
-            mask = explained_pixels(self._data.depth(frame), camera_of(frame), placed)
-            kept = self._explained = (frame.id, known, mask)
-        return kept[2]
+            self._explained[frame.id] = explained_pixels(self._data.depth(frame), camera_of(frame), placed)
+        return self._explained[frame.id]
 
     def _visible(self) -> list[Thing]:
         return [thing for thing in self.things if thing.known] if self.shown else []

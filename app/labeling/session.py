@@ -21,13 +21,22 @@ from app.labeling.machine import Machine
 from app.labeling.same_pose import SamePose
 from app.labeling.search import Region, RequestSearch, Search
 from app.labeling.session_state import SessionState
-from app.labeling.snap_exchange import KnownObject, RequestSnap
+from app.labeling.snap_exchange import ChooseFrames, KnownObject, RequestSnap, Wanted
 from app.labeling.start_spread import StartSpread, Unsaid
-from app.labeling.tools import TOOL_OF, Tool, methods_of, require, require_method, tools_of
+from app.labeling.tools import (
+    TOOL_OF,
+    Tool,
+    frame_uses_of,
+    methods_of,
+    require,
+    require_frames,
+    require_method,
+    tools_of,
+)
 from app.labeling.track import ActionError, RecordEvent, Track
 from app.labeling.turns import Turns
 from app.methods import config_of
-from app.tables import Condition, Method
+from app.tables import Condition, FrameUse, Method
 from registration_core import SnapConfig
 
 Array = NDArray[np.float64]
@@ -50,6 +59,7 @@ class LabelingSession:
         record_event: Writes an event durably; raises where it cannot.
         request_snap: Hands an order to the workers.
         request_search: Hands a search to the workers.
+        choose_frames: Chooses the frames of a snap.
         skip_reason: Why it was skipped, where it was.
         known_objects: Tells what is known of other objects in the scene.
         now: Tells the seconds that the paths of drags are written down with.
@@ -70,6 +80,7 @@ class LabelingSession:
         record_event: RecordEvent,
         request_snap: RequestSnap,
         request_search: RequestSearch,
+        choose_frames: ChooseFrames,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,
         now: Callable[[], float] = time.monotonic,
@@ -81,6 +92,8 @@ class LabelingSession:
         self.methods = methods_of(condition, in_study, method)
         """What Snap may compute with."""
         self._method = self.methods[0]
+        self.frame_uses = frame_uses_of(condition, in_study)
+        """The frames that Snap may use."""
         self.registration_id = registration_id
         self._state = state
         self._skip_reason = skip_reason
@@ -93,11 +106,13 @@ class LabelingSession:
             self._track,
             self.tools,
             self.methods,
+            self.frame_uses,
             condition == "auto",
             same_pose,
             lambda order, on_progress, on_end: request_snap(
                 order, turns.report(on_progress), turns.report(on_end)
             ),
+            choose_frames,
             known_objects,
         )
         self._search = Search(
@@ -140,6 +155,7 @@ class LabelingSession:
                 snap=self._machine.status,
                 offer=self._machine.offer,
                 method=self._method,
+                frame_use=self._machine.frame_use,
                 is_live=self._machine.is_live,
                 live=self._machine.live,
                 estimate_snap_id=None if track.drag else history.current.snap_id,
@@ -294,6 +310,7 @@ class LabelingSession:
         config: SnapConfig | None = None,
         seed: int | None = None,
         start_spread: StartSpread | Unsaid | None = Unsaid.FROM_DRAGS,
+        frames: Wanted | None = None,
     ) -> str:
         """Ask the workers for a better pose from the present one; the newest request wins.
 
@@ -302,13 +319,22 @@ class LabelingSession:
             config: That of the chosen method where it is None.
             seed: A fresh one where it is None.
             start_spread: How far off the present pose may be; None where that is unknown.
+            frames: Those that it is to use; the chosen ones where it is None.
 
         Returns:
             The snap's id.
         """
         with self._turns.change():
             self._require_open()
-            return self._machine.snap(actor, config or config_of(self._method), seed, start_spread)
+            self._require_frames_of_scene(frames)
+            return self._machine.snap(actor, config or config_of(self._method), seed, start_spread, frames)
+
+    def choose_frames(self, choice: FrameUse) -> None:
+        """Let Snap use these frames from now on, where it is not asked otherwise. That moves nothing."""
+        with self._turns.change():
+            require(self.tools, "snap")
+            require_frames(self.frame_uses, choice)
+            self._machine.frame_use = choice
 
     def choose_method(self, method: Method) -> None:
         """Let Snap compute with this from now on, where it is not asked otherwise. That moves nothing."""
@@ -402,6 +428,12 @@ class LabelingSession:
     def _require_open(self) -> None:
         if not self._is_open:
             raise ActionError(f"This registration was {self._state}; reopen it to change it.")
+
+    def _require_frames_of_scene(self, frames: Wanted | None) -> None:
+        if isinstance(frames, tuple):
+            for frame_id in frames:
+                if frame_id not in self._frame_ids:
+                    raise ActionError(f"The scene has no frame {frame_id}.")
 
     def _require_free_hands(self) -> None:
         self._require_open()

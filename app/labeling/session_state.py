@@ -9,7 +9,7 @@ from app.labeling.assessment import Assessment
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.snap_exchange import Offer, SnapStatus
-from app.tables import Method
+from app.tables import FrameUse, Method
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,8 @@ class SessionState:
     offer: Offer | None
     method: Method
     """What Snap computes with."""
+    frame_use: FrameUse
+    """The frames that it uses."""
     is_live: bool
     live: Offer | None
     """Where a snap would land now."""

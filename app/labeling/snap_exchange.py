@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.auth import Actor
 from app.labeling.assessment import Assessment
 from app.labeling.start_spread import StartSpread
-from app.tables import EstimateRow, Method
+from app.tables import EstimateRow, FrameUse, Method
 from registration_core import Estimate, ObjectModel, SnapConfig
 
 Array = NDArray[np.float64]
@@ -26,12 +26,36 @@ class KnownObject:
     model: ObjectModel
 
 
+Wanted = FrameUse | tuple[int, ...]
+"""The frames that a snap is asked to use; ids name them one by one."""
+
+
+@dataclass(frozen=True)
+class SnapFrames:
+    """Ids of frames, best first."""
+
+    used: tuple[int, ...]
+    """The pose is looked for in these."""
+    others: tuple[int, ...] = ()
+    """They see the object, too: whether they agree speaks for the result, or against it."""
+
+
+class ChooseFrames(Protocol):
+    """Chooses the frames of a snap from a pose; `shown` is the frame that the operator looks at."""
+
+    def __call__(
+        self, shown: int, T_world_object: Array, known: tuple[KnownObject, ...], wanted: Wanted
+    ) -> SnapFrames: ...
+
+
 @dataclass(frozen=True)
 class SnapOrder:
     """What a snap is to work on."""
 
     snap_id: str
     frame_id: int
+    """The one that is shown."""
+    frames: SnapFrames
     T_world_object: Array
     config: SnapConfig
     seed: int
@@ -74,6 +98,18 @@ class RequestSnap(Protocol):
 
 
 @dataclass(frozen=True)
+class FramesReport:
+    """What frames had to do with a result."""
+
+    used: int
+    """So many it was found in."""
+    agreeing: int
+    """So many others agree with it, ..."""
+    asked: int
+    """... of those that see enough of the object to tell."""
+
+
+@dataclass(frozen=True)
 class SnapStatus:
     """How the last snap stands."""
 
@@ -85,6 +121,8 @@ class SnapStatus:
     """What it is computed with."""
     progress: float = 0.0
     message: str | None = None
+    frames: FramesReport | None = None
+    """Once it is done."""
 
     @property
     def is_live(self) -> bool:
@@ -129,6 +167,24 @@ def stored_known(known: tuple[KnownObject, ...]) -> list[dict[str, object]]:
     ]
 
 
+def frames_report(order: SnapOrder, estimate: Estimate) -> FramesReport:
+    """What frames had to do with an estimate, in numbers."""
+    others = [check for check in estimate.certificates.unused if check.is_enough]
+    return FramesReport(len(order.frames.used), sum(check.agrees for check in others), len(others))
+
+
+def stored_others(order: SnapOrder, estimate: Estimate) -> list[dict[str, object]]:
+    """What frames that were not used say of an estimate, as JSON keeps it; null where they cannot tell."""
+    return [
+        {
+            "frame_id": frame_id,
+            "share": check.match if check.is_enough else None,
+            "agrees": check.agrees if check.is_enough else None,
+        }
+        for frame_id, check in zip(order.frames.others, estimate.certificates.unused, strict=True)
+    ]
+
+
 def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> EstimateRow:
     """A result as it is kept, with all that is needed to repeat it."""
     estimate = result.estimate
@@ -154,6 +210,8 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         start_spread=stored_spread(order.start_spread),
         known_objects=stored_known(order.known),
         symmetries_version=result.symmetries_version,
+        used_frames=list(order.frames.used),
+        other_frames=stored_others(order, estimate),
         version=result.version,
         algorithm=estimate.algorithm,
         hardware=result.hardware,

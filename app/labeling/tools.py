@@ -4,8 +4,9 @@ from collections.abc import Collection
 from typing import Literal, get_args
 
 from app.auth import Role
+from app.labeling.snap_exchange import Wanted
 from app.labeling.track import ActionError
-from app.tables import Condition, Method, Registration
+from app.tables import Condition, FrameUse, Method, Registration
 
 Tool = Literal[
     "snap",
@@ -78,6 +79,20 @@ def methods_of(condition: Condition, in_study: bool, method: Method = "default")
     if in_study or condition not in ("snap", "auto"):
         return ("default",)
     return (method, *(other for other in get_args(Method) if other != method))
+
+
+def frame_uses_of(condition: Condition, in_study: bool) -> tuple[FrameUse, ...]:
+    """The frames that Snap may use on a task; the first until others are chosen.
+
+    A trial, and a technique that is compared, is about the one frame that is shown.
+    """
+    return ("current",) if in_study or condition not in ("snap", "auto") else ("auto", "current")
+
+
+def require_frames(choices: Collection[FrameUse], wanted: Wanted) -> None:
+    """Raise `ActionError` where Snap may not use these frames."""
+    if "auto" not in choices and wanted != "current":
+        raise ActionError("Snaps of this task use the frame that is shown alone: its condition has no other.")
 
 
 def require_method(methods: Collection[Method], method: Method) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.worker import Job, Tell, hardware
+from app.worker import ImageJob, Tell, hardware
 from registration_core import ALGORITHM, snap_steps
 from registration_core.viewpoint_model import ViewpointModel
 
@@ -46,7 +46,7 @@ class BatchResult:
 
 
 @dataclass(frozen=True)
-class SnapBatch(Job[BatchResult]):
+class SnapBatch(ImageJob[BatchResult]):
     """Snaps that know nothing of how far off their starts are, nor of other objects; `depth` is all of it."""
 
     starts: tuple[BatchStart, ...]

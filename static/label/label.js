@@ -30,6 +30,7 @@ import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
 import { seeingPart } from "./seeing.js";
 import { signInAgainHere } from "./sign-in-again.js";
+import { snapFramesPart } from "./snap-frames.js";
 import { followRegistration } from "./stream.js";
 import { thingsPart } from "./things.js";
 import { threePointsPart } from "./three-points.js";
@@ -74,6 +75,7 @@ const PARTS = [
   imagePart(page),
   machinePart(page),
   methodPart(page),
+  snapFramesPart(page),
   numbersPart(page),
   placePart(page),
   threePointsPart(page),
@@ -244,7 +246,7 @@ async function requestSnap() {
   const before = registration.snap;
   snapRequest = post(path("snaps"), {});
   const { method } = registration;
-  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method } });
+  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method, frames: null } });
   try {
     await snapRequest;
   } catch (error) {

@@ -2,6 +2,7 @@
 
 import { drawAssessment } from "../assessment.js";
 import { byId, icon, setText } from "../dom.js";
+import { framesText } from "../format.js";
 import { hintFor } from "./hint.js";
 import { isSnapping, snappingText, waitingText } from "./waiting.js";
 
@@ -95,7 +96,8 @@ function snapStatus({ state, snap, offer, confidence, method, methods }) {
   if (offer?.quiet) return "";
   if (offer) return "You moved the object meanwhile: the result is offered.";
   const how = snap.method === "paper" ? "Snapped by the paper’s filter" : "Snapped";
-  return confidence === null ? "" : `${how}, confidence ${confidence.toFixed(2)}.`;
+  const seen = framesText(snap.frames);
+  return confidence === null ? "" : `${how}, confidence ${confidence.toFixed(2)}${seen && ` · ${seen}`}.`;
 }
 
 function drawOffer({ offer, state }) {

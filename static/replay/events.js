@@ -1,7 +1,7 @@
 /** The list of events, and going from one to the next. */
 
 import { byId, element, icon } from "../dom.js";
-import { METHODS } from "../format.js";
+import { framesText, METHODS } from "../format.js";
 import { clockText } from "./clock.js";
 
 const WORDS = {
@@ -66,11 +66,12 @@ function row(event, choose) {
 }
 
 /** "Drag · tx, rz · 1.2 s", "Snap applied · fast · 0.97 · 0.1 s". */
-function sentence({ kind, start, end, dof, technique, verdict, method, confidence }) {
+function sentence({ kind, start, end, dof, technique, verdict, method, frames, confidence }) {
   const parts = [WORDS[kind] ?? kind.replaceAll("_", " ")];
   if (technique) parts.push(technique);
   if (method) parts.push(METHODS[method].name);
   if (kind === "drag" && dof) parts.push(dof.join(", "));
+  if (framesText(frames)) parts.push(framesText(frames));
   if (confidence !== null) parts.push(confidence.toFixed(2));
   if (verdict) parts.push(verdict);
   if (end - start >= 0.05) parts.push(`${(end - start).toFixed(1)} s`);

@@ -7,8 +7,8 @@ from threading import Event
 import numpy as np
 
 from app.snapping import SnapError
-from app.worker import JobResult, SnapJob
-from registration_core import Estimate, ObjectModel, SnapConfig, pose, snap
+from app.worker import JobResult, JobView, SnapJob
+from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, pose, snap
 from tests.app.export.site import CAMERA, NEAR_VIEW, T_WORLD_TOOL, TOOL, mesh_of, model_of, observed_depth
 
 DEPTH = observed_depth(NEAR_VIEW)
@@ -24,6 +24,11 @@ def new_model() -> ObjectModel:
     return ObjectModel(model.vertices + noise, model.faces)
 
 
+def view_of(depth: np.ndarray, camera: Intrinsics) -> JobView:
+    """The one image of a snap whose poses are in its camera."""
+    return JobView(depth, camera, np.eye(4), None)
+
+
 def new_job(
     model: ObjectModel, topic: str = "", config: SnapConfig | None = None, **changes: object
 ) -> SnapJob:
@@ -32,8 +37,8 @@ def new_job(
         "snap_id": uuid.uuid4().hex,
         "topic": topic,
         "model_hash": model.content_hash,
-        "depth": DEPTH,
-        "camera": CAMERA,
+        "views": (view_of(DEPTH, CAMERA),),
+        "used": 1,
         "T_camera_object": START,
         "config": config or SnapConfig(),
         "seed": SEED,
@@ -45,7 +50,8 @@ def new_job(
 def done_here(job: SnapJob, model: ObjectModel) -> Estimate:
     """What the same snap gives in this process."""
     rng = np.random.default_rng(job.seed)
-    return snap(model, job.depth, job.camera, job.T_camera_object, job.config, rng, job.start_spread)
+    (view,) = job.views
+    return snap(model, view.depth, view.camera, job.T_camera_object, job.config, rng, job.start_spread)
 
 
 def assert_same(a: Estimate, b: Estimate) -> None:

@@ -26,6 +26,7 @@ from tests.app.snap_jobs import (
     done_here,
     new_job,
     new_model,
+    view_of,
 )
 from tests.app.waiting import LONGEST, wait_until
 
@@ -124,11 +125,11 @@ def test_it_finds_what_the_library_finds_on_the_whole_image(snapper, model):
     left, top, width, height = region_of_interest(model, camera, START, SnapConfig())
     assert width * height < 0.5 * image.size
     crop = np.ascontiguousarray(image[top : top + height, left : left + width])
-    job = new_job(model, snapper.topic, depth=crop, camera=camera.cropped(left, top, width, height))
+    job = new_job(model, snapper.topic, views=(view_of(crop, camera.cropped(left, top, width, height)),))
     outcome, _ = request(snapper, job, model)
     result = result_of(outcome)
     assert isinstance(result, JobResult)
-    assert_same(result.estimate, done_here(new_job(model, depth=image, camera=camera), model))
+    assert_same(result.estimate, done_here(new_job(model, views=(view_of(image, camera),)), model))
     assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.005
 
 
@@ -249,11 +250,11 @@ def test_a_snap_that_cannot_work_says_why(snapper, model):
     outcome, _ = request(snapper, new_job(model, snapper.topic, T_camera_object=far), model)
     end = result_of(outcome)
     assert isinstance(end, SnapError)
-    assert str(end).startswith("The snap cannot work on this: T_camera_object puts the object wholly outside")
+    assert str(end).startswith("The snap cannot work on this: T_world_object puts the object wholly outside")
 
 
 def test_what_nobody_foresaw_fails_the_snap_too(snapper, model):
-    job = new_job(model, snapper.topic, config=None, camera="no camera")
+    job = new_job(model, snapper.topic, config=None, views="no views")
     outcome, _ = request(snapper, job, model)
     end = result_of(outcome)
     assert isinstance(end, SnapError) and "the server's log says why" in str(end)

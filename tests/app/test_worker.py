@@ -1,6 +1,7 @@
 """What runs inside a worker process, run in one."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from app.worker import SearchJob, SnapCancelledError
 from registration_core import ObjectModel, SnapConfig, propose
 from registration_core.viewpoint_model import packed, viewpoint_model
 from tests.app.export.site import CAMERA
-from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model
+from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model, view_of
 from tests.app.waiting import LONGEST, wait_until
 
 
@@ -60,7 +61,8 @@ def test_it_finds_what_the_library_finds(client, addresses, model, content, conf
 
 
 def test_it_passes_by_what_it_is_told_of(client, addresses, model, content):
-    job = new_job(model, explained=np.ones(DEPTH.shape, dtype=np.bool_))
+    everything = replace(view_of(DEPTH, CAMERA), explained=np.ones(DEPTH.shape, dtype=np.bool_))
+    job = new_job(model, views=(everything,))
     result = run(client, addresses[0], worker.run_job, job, content)
     assert np.allclose(result.estimate.T_camera_object, job.T_camera_object)
     assert not result.estimate.converged
@@ -79,7 +81,7 @@ def test_it_searches_as_far_as_it_is_told(client, addresses, model, content, met
 
 
 def test_a_search_finds_what_the_library_finds(client, addresses, model, content):
-    job = SearchJob("a search", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, (0, 0, 400, 300))
+    job = SearchJob("a search", "", model.content_hash, SnapConfig(), DEPTH, CAMERA, 3, (0, 0, 400, 300))
     found = run(client, addresses[0], worker.run_job, job, content)
     here = propose(model, DEPTH, CAMERA, job.region, job.config, np.random.default_rng(job.seed))
     assert found.hypotheses and found.seconds > 0 and found.hardware
@@ -88,7 +90,7 @@ def test_a_search_finds_what_the_library_finds(client, addresses, model, content
 
 
 def test_a_search_cancelled_before_it_comes_does_not_run(client, addresses, model, content):
-    job = SearchJob("left", "", model.content_hash, DEPTH, CAMERA, SnapConfig(), 3, None)
+    job = SearchJob("left", "", model.content_hash, SnapConfig(), DEPTH, CAMERA, 3, None)
     client.run(worker.cancel, job.snap_id)
     with pytest.raises(SnapCancelledError):
         run(client, addresses[0], worker.run_job, job, content)
@@ -139,7 +141,7 @@ def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model,
 def test_a_bad_job_is_refused_by_name(client, addresses, model, content):
     far = T_CAMERA_TOOL.copy()
     far[:3, 3] = [50.0, 0.0, 1.0]
-    with pytest.raises(ValueError, match="T_camera_object puts the object wholly outside"):
+    with pytest.raises(ValueError, match="T_world_object puts the object wholly outside"):
         run(client, addresses[0], worker.run_job, new_job(model, T_camera_object=far), content)
     with pytest.raises(ValueError, match="start_spread must be"):
         run(client, addresses[0], worker.run_job, new_job(model, start_spread=(-1.0, 0.1)), content)

@@ -54,7 +54,7 @@ def running(script: httpx.Client, near: dict[str, Any]) -> Iterator[str]:
 def test_a_snap_by_rest_is_the_librarys_snap(
     live: LiveServer, script: httpx.Client, near: dict[str, Any]
 ) -> None:
-    done = finished_snap(script, request_snap(script, near, seed=7))
+    done = finished_snap(script, request_snap(script, near, seed=7, frames="current"))
     assert (done["state"], done["progress"], done["message"]) == ("done", 1.0, None)
     assert done["standing"] is None
     estimate = done["estimate"]
@@ -78,6 +78,43 @@ def test_a_snap_by_rest_is_the_librarys_snap(
     assert (estimate["evaluations"], estimate["seed"]) == (expected.evaluations, 7)
     assert estimate["algorithm"] == ALGORITHM
     assert SnapConfig.from_dict(estimate["config"]) == SnapConfig()
+
+
+def test_a_snap_uses_the_frames_that_see_the_object_and_is_checked_by_others(
+    live: LiveServer, script: httpx.Client, near: dict[str, Any]
+) -> None:
+    frames = live.seat(near["id"]).frames
+    shown, other = near["frame_id"], next(id for id in frames if id != near["frame_id"])
+    both = finished_snap(script, request_snap(script, near, seed=7))["estimate"]
+    assert (both["used_frames"], both["other_frames"], both["frame_id"]) == ([shown, other], [], shown)
+    report = script.get(url_of(near)).json()["snap"]["frames"]
+    assert report == {"used": 2, "agreeing": 0, "asked": 0}
+    for wanted, used in (("current", shown), ([other], other)):
+        estimate = finished_snap(script, request_snap(script, near, seed=7, frames=wanted))["estimate"]
+        assert (estimate["used_frames"], estimate["frame_id"]) == ([used], shown)
+        (said,) = estimate["other_frames"]
+        assert said["frame_id"] == (shown if used == other else other)
+        assert said["share"] > 0.9
+        assert said["agrees"] is True
+        T_world_camera = np.array(frames[shown].T_world_camera)
+        assert np.allclose(T_world_camera @ estimate["T_camera_object"], estimate["T_world_object"])
+        assert (
+            adi(np.array(estimate["T_world_object"]), true_pose(TOOL), live.seat(near["id"]).model.vertices)
+            < 0.003
+        )
+    (*_, requested, applied) = log_of(script, near["id"])
+    assert requested["detail"]["used_frames"] == applied["detail"]["used_frames"] == [other]
+    assert requested["detail"]["other_frames"] == [shown]
+    assert applied["detail"]["other_frames"] == estimate["other_frames"]
+    assert script.get(url_of(near)).json()["snap"]["frames"] == {"used": 1, "agreeing": 1, "asked": 1}
+
+
+def test_the_frames_that_snaps_use_are_chosen_once(script: httpx.Client, near: dict[str, Any]) -> None:
+    assert (near["frame_use"], near["frame_uses"]) == ("auto", ["auto", "current"])
+    answer = script.put(f"{url_of(near)}/snap-frames", json={"frames": "current"})
+    assert answer.json()["frame_use"] == "current"
+    estimate = finished_snap(script, request_snap(script, near))["estimate"]
+    assert estimate["used_frames"] == [near["frame_id"]]
 
 
 def test_a_finished_snap_moves_the_object(
@@ -227,6 +264,10 @@ def test_a_snap_that_cannot_work_says_why(script: httpx.Client, near: dict[str, 
         ({"start_spread": [0.03, -0.1]}, "body.start_spread.1"),
         ({"start_spread": [0.03, 3.2]}, "body.start_spread.1"),
         ({"start_spread": [0.03, None]}, "body.start_spread.1"),
+        ({"frames": "all"}, "body.frames"),
+        ({"frames": []}, "body.frames"),
+        ({"frames": [0]}, "body.frames"),
+        ({"frames": [1, 2], "config": {"preset": "paper"}}, "body.frames must name one frame"),
     ],
 )
 def test_a_bad_wish_names_the_field(

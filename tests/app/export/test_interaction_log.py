@@ -132,7 +132,7 @@ def test_an_estimate_has_what_repeats_it(site: Site, tmp_path: Path) -> None:
 def test_parquet_holds_the_same(site: Site, tmp_path: Path) -> None:
     fill(site)
     folder = tmp_path / "log"
-    loose = ("detail", "hypotheses", "ambiguities", "config", "known_objects")
+    loose = ("detail", "hypotheses", "ambiguities", "config", "known_objects", "other_images")
     for name, rows in zip(("events", "estimates"), written(site, folder), strict=True):
         table = pq.read_table(folder / f"{name}.parquet").to_pylist()
         assert len(table) == len(rows)

@@ -11,7 +11,15 @@ from app.labeling.history import History, Step
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
-from app.labeling.snap_exchange import RequestSnap, SnapFailure, SnapOrder, SnapResult
+from app.labeling.snap_exchange import (
+    KnownObject,
+    RequestSnap,
+    SnapFailure,
+    SnapFrames,
+    SnapOrder,
+    SnapResult,
+    Wanted,
+)
 from app.tables import Condition, EstimateRow, Method
 from registration_core import Ambiguity, Certificates, Check, Estimate, Hypothesis, pose
 
@@ -144,6 +152,8 @@ class Bench:
         self.log = Log()
         self.workers = Workers()
         self.searchers = Searchers()
+        self.others: tuple[int, ...] = ()
+        """Frames that are not used and see the object."""
         self.session = LabelingSession(
             registration_id=7,
             history=History((Step(START),)),
@@ -156,9 +166,17 @@ class Bench:
             record_event=self.log,
             request_snap=request_snap or self.workers,
             request_search=self.searchers,
+            choose_frames=self.choose_frames,
             in_study=in_study,
             method=method,
         )
+
+    def choose_frames(
+        self, shown: int, T_world_object: np.ndarray, known: tuple[KnownObject, ...], wanted: Wanted
+    ) -> SnapFrames:
+        """All frames, where the session is free to use them."""
+        used = wanted if isinstance(wanted, tuple) else FRAMES if wanted == "auto" else (shown,)
+        return SnapFrames(used, self.others)
 
     @property
     def state(self) -> SessionState:

@@ -29,7 +29,7 @@ def test_every_frame_of_a_scene_gives_the_same_pose(services, seat):
     for frame_id in seat.frames:
         seat.session.set_pose(true_pose(TOOL) @ pose.exp([0.008, 0, 0, 0, 0, 0]), Actor.HUMAN)
         seat.session.show_frame(frame_id, Actor.HUMAN)
-        seat.session.snap(Actor.HUMAN, seed=1)
+        seat.session.snap(Actor.HUMAN, seed=1, frames="current")
         assert wait_for_snap(seat) == "done"
         found.append(shown(seat))
     assert len(found) == 2

@@ -8,7 +8,7 @@ from app.labeling.machine import MOVED_ON, TAKEN_BACK
 from app.labeling.snap_exchange import SnapFailure
 from app.labeling.track import ActionError
 from registration_core import SnapConfig
-from tests.app.labeling.bench import START, Bench, result, shifted, thought
+from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted, thought
 
 SURE, UNSURE = 0.9, 0.7
 
@@ -58,7 +58,12 @@ def test_in_auto_the_machine_takes_over_at_the_end_of_a_drag_and_is_undone(auto)
     assert (drag.kind, drag.actor) == ("drag", Actor.HUMAN)
     assert (requested.kind, requested.actor) == ("snap_requested", Actor.MACHINE)
     assert (applied.kind, applied.actor) == ("snap_applied", Actor.MACHINE)
-    assert applied.detail == {"confidence": SURE, "assessment": thought("accept", SURE).stored()}
+    assert applied.detail == {
+        "confidence": SURE,
+        "assessment": thought("accept", SURE).stored(),
+        "used_frames": list(FRAMES),
+        "other_frames": [],
+    }
     assert auto.state.assessment == thought("accept", SURE)
     assert len(auto.log.estimates) == 1
     auto.session.undo(Actor.HUMAN)

@@ -1,16 +1,17 @@
 """Snaps as a session asks for them and takes what they bring, with workers held in hand."""
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from app.auth import Actor
-from app.labeling.snap_exchange import SnapFailure
+from app.labeling.snap_exchange import FramesReport, SnapFailure, SnapFrames
 from app.labeling.track import ActionError
 from registration_core import ALGORITHM, SnapConfig
-from tests.app.labeling.bench import FRAMES, PIVOT, START, SURE, Bench, result, shifted, thought
+from registration_core.certificates import NOTHING
+from tests.app.labeling.bench import CHECK, FRAMES, PIVOT, START, SURE, Bench, result, shifted, thought
 from tests.app.labeling.test_degrees_of_freedom import about, turn
 
 
@@ -35,10 +36,17 @@ def test_a_snap_is_applied_with_its_estimate(bench):
         "start_spread": None,
         "known_objects": [],
         "frame_id": FRAMES[0],
+        "used_frames": [FRAMES[0]],
+        "other_frames": [],
     }
     assert (applied.kind, applied.actor, applied.snap_id) == ("snap_applied", Actor.MACHINE, snap_id)
     assert np.array_equal(applied.T_before, START) and np.array_equal(applied.T_after, shifted(0.05))
-    assert applied.detail == {"confidence": 0.8, "assessment": thought("accept", 0.8).stored()}
+    assert applied.detail == {
+        "confidence": 0.8,
+        "assessment": thought("accept", 0.8).stored(),
+        "used_frames": [FRAMES[0]],
+        "other_frames": [],
+    }
     (row,) = bench.log.estimates
     assert (row.snap_id, row.registration_id, row.frame_id, row.seed) == (snap_id, 7, FRAMES[0], 42)
     assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
@@ -49,6 +57,56 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     assert row.certificates == asdict(SURE) and row.certificates["check"]["match"] == 0.96
     (ambiguity,) = row.ambiguities
     assert ambiguity == {"kind": "free motion", "motion": "turn", "axis": (0.0, 0.0, 1.0), "extent": 0.4}
+
+
+def test_a_snap_uses_the_frames_that_see_the_object_unless_it_is_asked_otherwise(bench):
+    assert bench.state.frame_use == "auto"
+    used = []
+    for wanted in (None, "current", FRAMES[1:], None):
+        bench.session.snap(Actor.HUMAN, frames=wanted)
+        used.append(bench.workers.snaps[-1].order.frames.used)
+        assert bench.log.events[-1].detail["used_frames"] == list(used[-1])
+    assert used == [FRAMES, FRAMES[:1], FRAMES[1:], FRAMES]
+    bench.session.choose_frames("current")
+    bench.session.snap(Actor.HUMAN)
+    assert bench.state.frame_use == "current"
+    assert bench.workers.snaps[-1].order.frames.used == FRAMES[:1]
+    with pytest.raises(ActionError, match="no frame 99"):
+        bench.session.snap(Actor.HUMAN, frames=(FRAMES[0], 99))
+
+
+def test_frames_that_were_not_used_say_whether_they_agree(bench):
+    bench.others = FRAMES[1:]
+    bench.session.snap(Actor.HUMAN, frames="current")
+    (snap,) = bench.workers.snaps
+    assert bench.state.snap.frames is None
+    snap.end(result(shifted(0.05), certificates=replace(SURE, unused=(CHECK,))))
+    assert bench.state.snap.frames == FramesReport(used=1, agreeing=1, asked=1)
+    (row,) = bench.log.estimates
+    said = [{"frame_id": FRAMES[1], "share": CHECK.match, "agrees": True}]
+    assert (row.used_frames, row.other_frames) == ([FRAMES[0]], said)
+    assert bench.log.events[-1].detail["other_frames"] == said
+    bench.session.snap(Actor.HUMAN, frames="current")
+    bench.workers.snaps[-1].end(result(shifted(0.06), certificates=replace(SURE, unused=(NOTHING,))))
+    assert bench.state.snap.frames == FramesReport(used=1, agreeing=0, asked=0)
+    assert bench.log.estimates[-1].other_frames == [{"frame_id": FRAMES[1], "share": None, "agrees": None}]
+
+
+def test_a_trial_and_a_compared_technique_use_the_frame_that_is_shown():
+    for bench in (Bench(in_study=True), Bench(condition="live snap")):
+        bench.session.snap(Actor.HUMAN)
+        assert bench.workers.snaps[-1].order.frames.used == FRAMES[:1]
+        for act in (
+            lambda bench=bench: bench.session.snap(Actor.HUMAN, frames=FRAMES),
+            lambda bench=bench: bench.session.choose_frames("auto"),
+        ):
+            with pytest.raises(ActionError, match="the frame that is shown alone"):
+                act()
+
+
+def test_live_snaps_use_the_frame_that_is_shown(bench):
+    bench.session.set_live(True, Actor.HUMAN)
+    assert bench.workers.snaps[-1].order.frames == SnapFrames(FRAMES[:1])
 
 
 def test_a_snap_is_told_how_far_the_last_drags_went_and_keeps_it(bench):
