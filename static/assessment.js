@@ -13,7 +13,7 @@ export function drawAssessment(node, assessment) {
   node.title = text;
   if (!assessment) return;
   const { verdict, reasons } = assessment;
-  node.dataset.verdict = verdict;
+  node.dataset.assessed = verdict;
   node.replaceChildren(
     icon(ICONS[verdict]),
     element("span", {}, element("strong", {}, verdict), `: ${reasons.join("; ")}`),

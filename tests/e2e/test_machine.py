@@ -104,8 +104,8 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) ->
     said = f"The machine took over, confidence {applied['detail']['confidence']:.2f}."
     expect(page.locator("#note")).to_contain_text(said)
     expect(page.locator("#note-undo")).to_have_text("Undo Ctrl Z")
-    expect(page.locator("#note-assessment")).to_contain_text("accept: at most 2 % of poses that are as sure")
-    expect(page.locator("#assessment")).to_contain_text("accept: at most 2 %")
+    expect(page.locator("#note-assessment")).to_contain_text("accept: at most 5 % of poses that are as sure")
+    expect(page.locator("#assessment")).to_contain_text("accept: at most 5 %")
     take_picture(page, "label-taken-over")
     page.keyboard.press("Control+z")
     desk.events("undo")
@@ -212,8 +212,13 @@ def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
     take_picture(page, "label-look")
     page.request.post(f"{desk.url}/submit")
     page.goto(f"{desk.root}/replay/{desk.state['id']}")
+    applied = page.locator("#events button").filter(has_text="Snap applied")
+    expect(applied).to_contain_text(assessment["verdict"])
+    applied.click()
     expect(page.locator("#ghost-assessment")).to_contain_text(assessment["reasons"][0])
-    expect(page.locator("#events")).to_contain_text(assessment["verdict"])
+    expect(page.locator("#source")).to_contain_text(
+        f"posed by the machine, {assessment['confidence']:.2f}, look"
+    )
     take_picture(page, "replay-look")
     page.goto(desk.root)
     expect(page.locator("#datasets")).to_contain_text("calibrated from 200 registrations")
