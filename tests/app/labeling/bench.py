@@ -122,7 +122,12 @@ def thought(verdict: Assessed, confidence: float) -> Assessment:
     return Assessment(verdict, ("because",), confidence, risk=0.02, threshold=0.8)
 
 
-def result(T: np.ndarray, confidence: float = 0.9, verdict: Assessed = "accept") -> SnapResult:
+def result(
+    T: np.ndarray,
+    confidence: float = 0.9,
+    verdict: Assessed = "accept",
+    certificates: Certificates = SURE,
+) -> SnapResult:
     estimate = Estimate(
         T_camera_object=T,
         confidence=confidence,
@@ -131,7 +136,7 @@ def result(T: np.ndarray, confidence: float = 0.9, verdict: Assessed = "accept")
         seconds=0.25,
         evaluations=1234,
         converged=True,
-        certificates=SURE,
+        certificates=certificates,
         ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
     )
