@@ -69,6 +69,10 @@ class Preparation:
         self._wanted.set()
 
     def _run(self) -> None:
+        try:
+            self._snapper.wait_until_ready()
+        except Exception:  # the server stops then, and says so
+            return
         while self._wanted.wait() and not self._closed:
             self._wanted.clear()
             try:

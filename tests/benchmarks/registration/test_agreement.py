@@ -43,7 +43,8 @@ def test_the_exact_best_has_to_be_among_three_of_300(better: int, kept: bool) ->
 def test_sparse_and_exact_rank_alike(drill: Instance) -> None:
     for spread in SPREADS:
         proposals, last = rankings(drill, spread)
-        assert 0.2 < proposals.correlation < last.correlation < 1.0
+        assert 0.2 < proposals.correlation < 1.0
+        assert 0.4 < last.correlation < 1.0
 
 
 def test_the_table_has_a_row_for_each_spread_and_weighing(drill: Instance) -> None:
