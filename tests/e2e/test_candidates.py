@@ -73,6 +73,7 @@ def test_modes_and_what_depth_cannot_tell_are_shown(server: Server, open_page: C
     truth = true_pose(desk.task["object"]["obj_id"], HIDDEN_HANDLE[0])
     near = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
     assert page.request.put(f"{desk.url}/pose", data={"T_world_object": near.tolist()}).ok
+    assert page.request.put(f"{desk.url}/snap-frames", data={"frames": "current"}).ok  # others see the handle
     assert page.request.post(f"{desk.url}/snaps", data={"seed": 1}).ok
     (applied,) = desk.events("snap_applied")
     cards = page.locator("#candidate-list button")
