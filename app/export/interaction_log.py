@@ -26,7 +26,10 @@ MATRIX = pa.list_(pa.list_(pa.float64()))
 TIME = pa.timestamp("us", tz="UTC")
 JSON_TEXT = pa.string()
 
-LOOSE_FIELDS = ("detail", "hypotheses", "ambiguities", "config", "known_objects", "other_images")
+LOOSE_FIELDS = (
+    *("detail", "hypotheses", "ambiguities", "certificates", "assessment"),
+    *("config", "known_objects", "other_images"),
+)
 """Without a fixed shape."""
 
 CONTEXT_FIELDS = [

@@ -201,6 +201,8 @@ def test_from_an_import_without_symmetries_to_an_export_with_them(
     job = page.request.post(f"{server.url}/api/exports", data={"dataset_id": accepted["dataset_id"]}).json()
     look = f"{server.url}/api/exports/{job['id']}"
     wait_until(lambda: page.request.get(look).json()["state"] in {"done", "failed"}, "the export to end", 180)
+    ended = page.request.get(look).json()
+    assert ended["state"] == "done", ended["message"]
     exported = zipfile.ZipFile(io.BytesIO(page.request.get(f"{look}/download").body()))
     (infos,) = [name for name in exported.namelist() if name.endswith("/models/models_info.json")]
     info = json.loads(exported.read(infos))[str(BLOCK)]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from app.export.interaction_log import ROWS_AT_ONCE, write_interaction_log
+from app.export.interaction_log import LOOSE_FIELDS, ROWS_AT_ONCE, write_interaction_log
 from app.tables import Dataset, EstimateRow, Event, Frame
 from registration_core import pose
 
@@ -58,6 +58,8 @@ def fill(site: Site) -> int:
                     covariance=np.eye(6).tolist(),
                     hypotheses=[{"T_camera_object": AFTER, "weight": 1.0}],
                     ambiguities=[FREE_TURN],
+                    certificates={"non_degenerate": False, "unused": []},
+                    assessment={"verdict": "look", "reasons": ["two poses fit"]},
                     converged=True,
                     seed=2**40,
                     config={"particles": 625, "nested": {"a": 1}},
@@ -127,12 +129,14 @@ def test_an_estimate_has_what_repeats_it(site: Site, tmp_path: Path) -> None:
     assert estimate["T_world_object_start"] == BEFORE
     assert estimate["hypotheses"] == [{"T_camera_object": AFTER, "weight": 1.0}]
     assert estimate["ambiguities"] == [FREE_TURN]
+    assert estimate["certificates"]["non_degenerate"] is False
+    assert estimate["assessment"]["verdict"] == "look"
 
 
 def test_parquet_holds_the_same(site: Site, tmp_path: Path) -> None:
     fill(site)
     folder = tmp_path / "log"
-    loose = ("detail", "hypotheses", "ambiguities", "config", "known_objects", "other_images")
+    loose = LOOSE_FIELDS
     for name, rows in zip(("events", "estimates"), written(site, folder), strict=True):
         table = pq.read_table(folder / f"{name}.parquet").to_pylist()
         assert len(table) == len(rows)
