@@ -35,7 +35,7 @@ export function snapFramesPart(page) {
   }
 
   const bindings = [
-    { keys: ["O"], does: "Snap with this frame only, or with all that see the object", run: toggle, tool: "snap" },
+    { keys: ["Shift+T"], does: "Snap with this frame only, or with all that see the object", run: toggle, tool: "snap" },
   ];
   return { title: "The machine", bindings, draw };
 }

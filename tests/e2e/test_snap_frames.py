@@ -25,7 +25,7 @@ def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk
     expect(status).to_contain_text(re.compile(r"confidence [01]\.\d\d · 2 frames, 1 of 1 other agrees\."))
     take_picture(page, "snap-frames")
 
-    page.keyboard.press("o")
+    page.keyboard.press("Shift+T")
     expect(only).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("Space")
     expect(status).to_contain_text("1 frame, 2 of 2 others agree")

@@ -94,7 +94,7 @@ def test_an_accepted_live_result_can_be_repeated_by_a_snap(
     script.post(f"{url}/accept")
     taken = finished_snap(script, log_of(script, looked["id"])[-1]["snap_id"])["estimate"]
     script.post(f"{url}/undo")
-    wanted = {"seed": taken["seed"], "config": taken["config"], "start_spread": taken["start_spread"]}
+    wanted = {name: taken[name] for name in ("seed", "config", "start_spread")} | {"frames": "current"}
     snap_id = script.post(f"{url}/snaps", json=wanted).json()["id"]
     assert finished_snap(script, snap_id)["estimate"]["T_world_object"] == taken["T_world_object"]
 
