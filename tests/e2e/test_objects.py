@@ -28,8 +28,8 @@ def true_poses() -> dict[str, np.ndarray]:
     return {names[t.obj_id]: image.T_world_camera @ t.T_camera_object for t in image.ground_truth or ()}
 
 
-def finish_another(desk: Desk, name: str, T_world_object: np.ndarray) -> str:
-    """Submit another object of the scene as the same operator; returns the registration's address."""
+def finish_another(desk: Desk, name: str, T_world_object: np.ndarray) -> tuple[int, str]:
+    """Submit another object of the scene as the same operator: (task, the registration's address)."""
     request = desk.page.request
     tasks = request.get(f"{desk.root}/api/tasks?scene_id=1").json()["items"]
     task_id = next(task["id"] for task in tasks if task["object"]["name"] == name)
@@ -37,21 +37,22 @@ def finish_another(desk: Desk, name: str, T_world_object: np.ndarray) -> str:
     url = f"{desk.root}/api/registrations/{started['id']}"
     assert request.put(f"{url}/pose", data={"T_world_object": T_world_object.tolist()}).ok
     assert request.post(f"{url}/submit").ok
-    return url
+    return task_id, url
 
 
 def test_what_is_done_is_shown_listed_and_hidden(server: Server, open_page: Callable[[str], Page]) -> None:
     desk = Desk(open_page(server.new_link("several")), server, "mug")
     page, poses = desk.page, true_poses()
     others = [name for name in poses if name != desk.task["object"]["name"]][:3]
-    urls = [finish_another(desk, name, poses[name]) for name in others]
+    finished = [finish_another(desk, name, poses[name]) for name in others]
+    task_id = finished[0][0]
     page.request.post(f"{desk.url}/skip", data={"reason": "ambiguous"})  # draws the page anew
     page.request.post(f"{desk.url}/reopen")
     expect(page.locator("#things-done")).to_contain_text(re.compile("[3-9] of . others done"), timeout=30_000)
     page.locator("#things summary").click()
-    entry = page.locator("#things-list a", has_text=others[0])
+    entry = page.locator(f"#things-list a[href='/label/{task_id}']")
     expect(entry).to_contain_text("done")
-    node = f"/neighbours/{entry.get_attribute('href').rsplit('/', 1)[1]}"
+    node = f"/neighbours/{task_id}"
     desk.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
@@ -66,10 +67,10 @@ def test_what_is_done_is_shown_listed_and_hidden(server: Server, open_page: Call
     desk.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)
     page.locator("#hide-things").click()
     desk.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
-    page.locator("#things-list a", has_text=others[0]).click()
-    page.wait_for_url(f"**{node.replace('/neighbours', '/label')}")
-    expect(page.locator("#crumb-object")).to_have_text(others[0], timeout=30_000)
-    for url in urls:
+    entry.click()
+    page.wait_for_url(f"**/label/{task_id}")
+    expect(page.locator("#crumb-object")).to_contain_text(others[0], timeout=30_000)
+    for _, url in finished:
         page.request.post(f"{url}/reopen")
 
 

@@ -30,6 +30,7 @@ def desk(server: Server, open_page: Callable[[str], Page]) -> Desk:
     desk.events("snap_applied")
     page.keyboard.press("Control+z")
     desk.events("undo")
+    expect(page.locator("#submit")).to_be_enabled()  # the page has heard that the snap has ended
     page.keyboard.press("Enter")
     desk.events("submit")
     return desk

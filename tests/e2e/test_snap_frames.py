@@ -1,7 +1,7 @@
 """Snap with the frames that see the object, or with the one that is shown alone."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -9,11 +9,18 @@ from playwright.sync_api import Page, expect
 from tests.e2e.conftest import take_picture
 from tests.e2e.test_labelling import Desk
 from tests.e2e.test_machine import Open, open_desk
-from tests.processes import Server
+from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
 
 __all__ = ["open_desk"]
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server that nobody else has used: what others submit in a scene explains measured points."""
+    with serving(tmp_path_factory.mktemp("frames"), "--prepare") as running:
+        yield running
 
 
 def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk: Open) -> None:

@@ -100,7 +100,7 @@ def export_with_page(page: Page, server: Server, folder: Path) -> zipfile.ZipFil
     page.goto(f"{server.url}/export")
     page.get_by_label("Dataset").select_option(label="ycbv")
     page.get_by_role("button", name="Start the export").click()
-    link = page.get_by_role("link", name="Download").first
+    link = page.locator("#download")  # of this export: earlier ones are listed below it
     link.wait_for(timeout=120_000)
     take_picture(page, "export-done")
     with page.expect_download() as download:
