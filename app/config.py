@@ -12,6 +12,8 @@ PROJECT = Path(__file__).resolve().parents[1]
 RISK = 0.05
 """Share of wrong poses among those that the machine may accept by their confidence; certificates are asked
 for besides. The calibration that comes with the package bears out no less; one of a dataset's own may."""
+LEAST_RISK = 0.0001
+"""The least that can be asked for: one in ten thousand."""
 
 
 class Settings(BaseSettings):
@@ -31,7 +33,7 @@ class Settings(BaseSettings):
     """Dask scheduler of a cluster; empty: worker processes on this machine."""
     workers: Annotated[int, Field(ge=1, le=256)] = 2
     """Worker processes to start on this machine."""
-    risk: Annotated[float, Field(gt=0, lt=1)] = RISK
+    risk: Annotated[float, Field(ge=LEAST_RISK, lt=1)] = RISK
     """Share of wrong poses among those that the machine may accept, where a dataset says nothing else."""
     max_upload_mb: Annotated[int, Field(ge=1)] = 4096
     """Largest dataset that may be uploaded, megabytes, packed and unpacked."""

@@ -47,6 +47,7 @@ from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.services import Services
 from app.snapping import Snapper, create_snapper
+from app.standards import Standards
 from app.storage import FileStore
 from app.study.studies import Studies
 
@@ -65,6 +66,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
     log = EventLog(database)
     data = SceneData(files)
     snapper = snapper or create_snapper(settings)
+    standards = Standards(database, settings.risk)
     return Services(
         settings=settings,
         database=database,
@@ -74,7 +76,8 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         data=data,
         snapper=snapper,
         preparation=Preparation(database, data, snapper),
-        desk=Desk(database, log, data, snapper, settings.risk),
+        standards=standards,
+        desk=Desk(database, log, data, snapper, standards),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
         kept=Kept(database),

@@ -13,6 +13,7 @@ from app.preparation import Preparation
 from app.replay.replays import Replays
 from app.scene_data import SceneData
 from app.snapping import Snapper
+from app.standards import Standards
 from app.storage import FileStore
 from app.study.studies import Studies
 
@@ -29,6 +30,7 @@ class Services:
     data: SceneData
     snapper: Snapper
     preparation: Preparation
+    standards: Standards
     desk: Desk
     replays: Replays
     export_jobs: ExportJobs

@@ -11,7 +11,7 @@ from app.database import Database
 from app.labeling.assessment import Standard
 from app.tables import CalibrationRow, Dataset
 from registration_core import Recalibration, acceptance, calibration_of
-from registration_core.acceptance import NEVER, fewest
+from registration_core.acceptance import NEVER, fewest, shipped_calibration
 from registration_core.algorithm import ALGORITHM
 
 
@@ -39,6 +39,12 @@ class Standards:
         risk = self.risk if risk is None else risk
         return _shipped(risk) if row is None else self._calibrated(risk, *row)
 
+    def of_row(self, row: Dataset, risk: float | None = None) -> Standard:
+        """The same of a dataset that was read already; of another risk than its own where one is given."""
+        risk = next(one for one in (risk, row.risk, self.risk) if one is not None)
+        own = row.calibration
+        return _shipped(risk) if own is None or own.algorithm != ALGORITHM else standard_of(own, risk)
+
     @lru_cache(maxsize=256)  # noqa: B019 - there is one of it, as long as the application runs
     def _calibrated(self, risk: float, calibration_id: int, _created_at: object) -> Standard:
         with self._database.read() as session:
@@ -54,11 +60,12 @@ def standard_of(row: CalibrationRow, risk: float) -> Standard:
     corrected = Recalibration(row.stretch, row.shift)
     own = calibration_of(row.confidences, row.right, "the dataset's own registrations")
     if len(own) >= fewest(risk, own.delta):
-        return Standard(risk, acceptance(risk, own), corrected)
+        return Standard(risk, acceptance(risk, own), corrected, is_own=True, rests_on=len(own))
     shipped = acceptance(risk)
-    return Standard(risk, float(corrected(shipped)) if shipped <= 1.0 else NEVER, corrected)
+    threshold = float(corrected(shipped)) if shipped <= 1.0 else NEVER
+    return Standard(risk, threshold, corrected, rests_on=len(shipped_calibration()))
 
 
 @lru_cache
 def _shipped(risk: float) -> Standard:
-    return Standard(risk, acceptance(risk))
+    return Standard(risk, acceptance(risk), rests_on=len(shipped_calibration()))

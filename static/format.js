@@ -11,6 +11,11 @@ export function count(number, noun) {
   return `${number.toLocaleString("en")} ${noun}${number === 1 ? "" : "s"}`;
 }
 
+/** "5 %", "0.5 %" of a share. */
+export function percent(share) {
+  return `${Number((100 * share).toPrecision(3))} %`;
+}
+
 /** "12 kB", "8.4 MB", "312 MB". */
 export function fileSize(bytes) {
   if (bytes < 1e6) return `${Math.ceil(bytes / 1e3)} kB`;

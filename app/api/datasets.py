@@ -1,13 +1,14 @@
 """Datasets: what there is, and taking one in."""
 
+import math
 import shutil
 import tempfile
 from datetime import datetime
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, HTTPException, Request
+from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from pydantic import BaseModel, Field
 from sqlalchemy import distinct, func, select
@@ -29,8 +30,12 @@ from app.api.dependencies import (
 from app.api.problems import InputError
 from app.archives import import_archive
 from app.auth import Identity
+from app.calibrating import FEWEST
+from app.config import LEAST_RISK
+from app.labeling.assessment import Standard
 from app.services import Services
 from app.tables import OUTSIDE_STUDIES, CalibrationRow, Dataset, Object, Registration, Scene, Task
+from registration_core.acceptance import fewest
 from registration_core.algorithm import ALGORITHM
 
 router = APIRouter(prefix="/api/datasets", tags=["datasets"])
@@ -56,6 +61,9 @@ UPLOAD_BODY = {
 }
 
 
+RiskQuery = Annotated[float | None, Query(ge=LEAST_RISK, lt=1, allow_inf_nan=False)]
+
+
 class CalibrationOut(BaseModel):
     """What a dataset's own registrations have taught of the confidence."""
 
@@ -70,7 +78,23 @@ class CalibrationOut(BaseModel):
 class Risk(BaseModel):
     """Share of wrong poses among those that the machine may accept."""
 
-    risk: float | None = Field(gt=0, lt=1, allow_inf_nan=False, description="Null: as the settings say.")
+    risk: float | None = Field(
+        ge=LEAST_RISK, lt=1, allow_inf_nan=False, description="Null: as the settings say."
+    )
+
+
+class AcceptanceOut(BaseModel):
+    """From which confidence on the machine may accept a pose, and how that is known."""
+
+    risk: float
+    threshold: float | None = Field(
+        description="The confidence; null where none is known that bears the risk out."
+    )
+    is_own: bool = Field(
+        description="Whether the dataset's own registrations tell, not the shipped calibration."
+    )
+    rests_on: int = Field(description="So many registrations, or estimates of the shipped calibration.")
+    needs: int = Field(description="The fewest registrations of its own that could bear this risk out.")
 
 
 class DatasetOut(BaseModel):
@@ -86,6 +110,9 @@ class DatasetOut(BaseModel):
     tasks: int
     tasks_submitted: int
     risk: float = Field(description="Share of wrong poses among those that the machine may accept.")
+    risk_is_set: bool = Field(description="Whether it was set for this dataset; else the settings say it.")
+    risk_of_settings: float
+    acceptance: AcceptanceOut
     calibration: CalibrationOut | None = Field(description="Null where the shipped one is used.")
     created_at: datetime
 
@@ -104,6 +131,15 @@ def get_dataset(dataset_id: Id, services: ServicesDep, _identity: IdentityDep) -
     """One dataset."""
     with services.database.read() as session:
         return _out(services, session, row_or_404(session, Dataset, dataset_id))
+
+
+@router.get("/{dataset_id}/acceptance")
+def get_acceptance(
+    dataset_id: Id, services: ServicesDep, _identity: ReviewerDep, risk: RiskQuery = None
+) -> AcceptanceOut:
+    """What a risk would ask for, before it is set; the present one where none is given."""
+    with services.database.read() as session:
+        return _acceptance_out(services.standards.of_row(row_or_404(session, Dataset, dataset_id), risk))
 
 
 @router.put("/{dataset_id}/risk")
@@ -164,6 +200,16 @@ def _calibration_out(row: CalibrationRow | None) -> CalibrationOut | None:
     )
 
 
+def _acceptance_out(standard: Standard) -> AcceptanceOut:
+    return AcceptanceOut(
+        risk=standard.risk,
+        threshold=standard.threshold if standard.threshold <= 1.0 else None,
+        is_own=standard.is_own,
+        rests_on=standard.rests_on,
+        needs=max(FEWEST, math.ceil(fewest(standard.risk))),
+    )
+
+
 def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
     tasks = (
         select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id, ~Task.is_for_studies)
@@ -175,6 +221,7 @@ def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
         .where(Scene.dataset_id == row.id, Registration.state == "submitted", OUTSIDE_STUDIES)
     )
     objects = session.scalars(select(Object).where(Object.dataset_id == row.id)).all()
+    standard = services.standards.of_row(row)
     return DatasetOut(
         id=row.id,
         name=row.name,
@@ -185,7 +232,10 @@ def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
         scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
         tasks=session.scalar(tasks) or 0,
         tasks_submitted=session.scalar(submitted) or 0,
-        risk=services.settings.risk if row.risk is None else row.risk,
+        risk=standard.risk,
+        risk_is_set=row.risk is not None,
+        risk_of_settings=services.standards.risk,
+        acceptance=_acceptance_out(standard),
         calibration=_calibration_out(row.calibration),
         created_at=row.created_at,
     )

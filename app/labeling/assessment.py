@@ -37,6 +37,10 @@ class Standard:
     """The corrected confidence from which on that holds; above 1 where none is known."""
     recalibration: Recalibration = field(default_factory=Recalibration)
     """What a dataset's own registrations have taught."""
+    is_own: bool = False
+    """Whether the threshold stems from the dataset's own registrations, not from the shipped calibration."""
+    rests_on: int = 0
+    """Number of estimates or registrations that it was read off."""
 
 
 @dataclass(frozen=True)

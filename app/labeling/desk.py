@@ -10,7 +10,6 @@ import numpy as np
 from sqlalchemy import select
 
 from app.auth import Identity, Role
-from app.config import RISK
 from app.database import Database
 from app.event_log import STATE_AFTER, EventLog, NewEvent
 from app.labeling.depth_reading import DepthReading, DepthView
@@ -48,17 +47,17 @@ class Desk:
 
     Args:
         database, log, data, snapper: What sessions work with.
-        risk: Share of wrong poses among those that the machine may accept, where a dataset says nothing else.
+        standards: What is asked of estimates before the machine may take over.
     """
 
     def __init__(
-        self, database: Database, log: EventLog, data: SceneData, snapper: Snapper, risk: float = RISK
+        self, database: Database, log: EventLog, data: SceneData, snapper: Snapper, standards: Standards
     ) -> None:
         self._database = database
         self._log = log
         self._data = data
         self._snapper = snapper
-        self._standards = Standards(database, risk)
+        self._standards = standards
         self._seats: dict[int, Seat] = {}
         self._lock = threading.Lock()
 

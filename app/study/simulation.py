@@ -17,6 +17,7 @@ from app.auth import Actor, Identity, Role
 from app.database import Database
 from app.event_log import EventLog
 from app.labeling.desk import Desk
+from app.standards import Standards
 from app.study.plan import StudyPlan
 from app.study.simulated_operator import CARES, HANDS, SimulatedClock, SimulatedOperator
 from app.study.workplace import Workplace
@@ -89,7 +90,8 @@ def simulate(workplace: Workplace, study_id: int, on_progress: Callable[[int, in
         workplace.studies.consent(participant.id)
         clock = _clock_of(workplace.database, participant)
         log = EventLog(workplace.database, clock)
-        desk = Desk(workplace.database, log, workplace.data, workplace.snapper)
+        standards = Standards(workplace.database)
+        desk = Desk(workplace.database, log, workplace.data, workplace.snapper, standards)
         try:
             for trial in participant.trials:
                 rng = np.random.default_rng([participant.study.seed, number, trial.place])

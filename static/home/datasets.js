@@ -2,14 +2,17 @@
 
 import { getAll } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
-import { count } from "../format.js";
+import { count, percent } from "../format.js";
 
 const ASK_AGAIN_MS = 1000;
 
 let timer = null;
 
-/** Shows all datasets and returns them. `choose(id or null)` is called when one is pressed. */
-export async function showDatasets({ selected, choose, openImport }) {
+/**
+ * Shows all datasets and returns them. `choose(id or null)` is called when one is pressed; `openImport` and
+ * `openRisk(dataset)` are null for those who may not.
+ */
+export async function showDatasets({ selected, choose, openImport, openRisk }) {
   const datasets = await getAll("/api/datasets");
   const buttons = datasets.map((dataset) => datasetButton(dataset));
 
@@ -24,7 +27,10 @@ export async function showDatasets({ selected, choose, openImport }) {
     });
   }
   press(selected);
-  const cards = datasets.map((dataset, index) => element("div", {}, buttons[index], objectsLink(dataset)));
+  const cards = datasets.map((dataset, index) => {
+    const links = [objectsLink(dataset), ...(openRisk ? [riskButton(dataset, openRisk)] : [])];
+    return element("div", {}, buttons[index], element("p", { className: "dataset-links" }, ...links));
+  });
   byId("datasets").replaceChildren(...(cards.length ? cards : [nothingImported(openImport)]));
   followPreparation(datasets);
   return datasets;
@@ -69,10 +75,24 @@ function datasetButton({ id, name, scenes, tasks, tasks_submitted: submitted, ca
 
 /** "5 objects · 2 with suggested symmetries": leads to one that nobody has decided about, if there is one. */
 function objectsLink({ id, name, objects, suggestions_open: open }) {
-  const link = element("a", { className: "dataset-objects", href: `/objects?dataset_id=${id}` }, count(objects, "object"));
+  const link = element("a", { href: `/objects?dataset_id=${id}` }, count(objects, "object"));
   link.setAttribute("aria-label", `Objects of ${name}`);
   if (open) link.append(" · ", icon("machine"), `${open} with suggested symmetries`);
   return link;
+}
+
+/** "risk 5 %", with a sign where no confidence bears it out. */
+function riskButton(dataset, openRisk) {
+  const { name, risk, acceptance } = dataset;
+  const props = { type: "button", className: "link", onclick: () => openRisk(dataset) };
+  const button = element("button", props, `risk ${percent(risk)}`);
+  button.setAttribute("aria-haspopup", "dialog");
+  button.setAttribute("aria-label", `Risk of ${name}: ${percent(risk)}`);
+  if (acceptance.threshold === null) {
+    button.append(icon("alert"));
+    button.title = "No confidence bears it out";
+  }
+  return button;
 }
 
 function calibrationText({ registrations, is_current: isCurrent }) {

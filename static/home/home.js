@@ -2,12 +2,13 @@
 
 import { showAccount } from "../account.js";
 import { byId } from "../dom.js";
-import { count } from "../format.js";
+import { count, percent } from "../format.js";
 import { messageArea } from "../message.js";
 import { setUpAddTasks } from "./add-tasks.js";
 import { showDatasets } from "./datasets.js";
 import { setUpImport } from "./import.js";
 import { showNextTask } from "./next-task.js";
+import { setUpRisk } from "./risk.js";
 import { setUpTasks } from "./tasks.js";
 
 const message = messageArea(byId("message"));
@@ -33,13 +34,18 @@ async function showHome(me) {
     message.show(`${count(added, "task")} added.`, "good");
     return showAll(tasks.filter.dataset_id);
   });
+  const riskDialog = setUpRisk(({ name, risk }) => {
+    message.show(`Risk of ${name}: ${percent(risk)}. Snaps go by it from now on.`, "good");
+    return showAll(tasks.filter.dataset_id);
+  });
   byId("open-import").addEventListener("click", importDialog.open);
   byId("open-add-tasks").addEventListener("click", openAddTasks);
 
   async function showAll(datasetId) {
     const chooseDataset = (id) => tasks.chooseDataset(id).catch(message.problem);
     const openImport = isAdmin ? importDialog.open : null;
-    const datasets = await showDatasets({ selected: datasetId, choose: chooseDataset, openImport });
+    const openRisk = me.role === "operator" ? null : riskDialog.open;
+    const datasets = await showDatasets({ selected: datasetId, choose: chooseDataset, openImport, openRisk });
     tasks.setDatasets(datasets);
     byId("open-add-tasks").hidden = !isAdmin || datasets.length === 0;
     await Promise.all([showNextTask(datasets), tasks.chooseDataset(datasetId)]);

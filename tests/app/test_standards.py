@@ -8,7 +8,7 @@ from app.database import Database
 from app.standards import Standards, standard_of
 from app.tables import CalibrationRow, Dataset
 from registration_core import ALGORITHM, acceptance
-from registration_core.acceptance import NEVER
+from registration_core.acceptance import NEVER, shipped_calibration
 
 
 @pytest.fixture
@@ -56,6 +56,11 @@ def test_a_dataset_has_its_own_risk_and_calibration_from_now_on(database, datase
     assert standard.risk == 0.1
     assert 0.1 < standard.threshold <= 0.5
     assert standard.recalibration(0.5) == pytest.approx(1 / (1 + np.exp(-1.0)))
+    assert (standard.is_own, standard.rests_on) == (True, 250)
+    with database.read() as session:
+        row = session.get_one(Dataset, dataset_id)
+        assert standards.of_row(row) == standard
+        assert standards.of_row(row, 0.2).risk == 0.2
     assert standards.of(dataset_id + 1).risk == RISK
 
 
@@ -70,4 +75,5 @@ def test_one_that_is_too_small_for_the_risk_leaves_the_shipped_threshold(monkeyp
     monkeypatch.setattr("app.standards.acceptance", lambda risk, own=None: 0.6 if own is None else NEVER)
     small = standard_of(calibration(1, right=50), 0.02)
     assert small.threshold == pytest.approx(small.recalibration(0.6))
+    assert (small.is_own, small.rests_on) == (False, len(shipped_calibration()))
     assert standard_of(calibration(1, right=120), 0.02).threshold == NEVER

@@ -6,7 +6,8 @@ import pytest
 
 from app.config import RISK
 from app.tables import CalibrationRow
-from registration_core import ALGORITHM, pose
+from registration_core import ALGORITHM, acceptance, pose
+from registration_core.acceptance import shipped_calibration
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, put_pose, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose
@@ -40,9 +41,39 @@ def test_a_lead_sets_the_risk_and_takes_it_back(operator: httpx.Client, reviewer
     assert "no dataset" in sentence(reviewer.put("/api/datasets/99/risk", json={"risk": 0.1}), 404)
 
 
-@pytest.mark.parametrize("risk", [0, 1, -0.1, "much"])
+@pytest.mark.parametrize("risk", [0, 1, -0.1, 1e-5, "much"])
 def test_a_risk_that_is_no_share_is_refused(reviewer: httpx.Client, risk: object) -> None:
     assert "risk" in sentence(reviewer.put("/api/datasets/1/risk", json={"risk": risk}), 422)
+    assert "risk" in sentence(reviewer.get("/api/datasets/1/acceptance", params={"risk": risk}), 422)
+
+
+def test_a_dataset_tells_which_confidence_its_risk_asks_for(
+    server: LiveServer, operator: httpx.Client, reviewer: httpx.Client
+) -> None:
+    shipped = {"is_own": False, "rests_on": len(shipped_calibration())}
+    told = operator.get("/api/datasets/1").json()
+    assert (told["risk_is_set"], told["risk_of_settings"]) == (False, RISK)
+    assert told["acceptance"] == {"risk": RISK, "threshold": acceptance(RISK), "needs": 45} | shipped
+    tried = reviewer.get("/api/datasets/1/acceptance", params={"risk": 0.0001}).json()
+    assert tried == {"risk": 0.0001, "threshold": None, "needs": 23_025} | shipped
+    assert not operator.get("/api/datasets/1").json()["risk_is_set"]  # trying one sets none
+    assert "reviewer" in sentence(operator.get("/api/datasets/1/acceptance", params={"risk": 0.1}), 403)
+
+    calibrate(server)
+    told = reviewer.put("/api/datasets/1/risk", json={"risk": 0.02}).json()
+    assert told["risk_is_set"]
+    assert told["acceptance"] == {
+        "risk": 0.02,
+        "threshold": 0.0,
+        "is_own": True,
+        "rests_on": 150,
+        "needs": 114,
+    }
+    too_little = reviewer.get("/api/datasets/1/acceptance", params={"risk": 0.01}).json()
+    assert (too_little["is_own"], too_little["needs"]) == (False, 230)
+    calibrate(server, algorithm="another")
+    assert not reviewer.get("/api/datasets/1/acceptance").json()["is_own"]
+    reviewer.put("/api/datasets/1/risk", json={"risk": None})
 
 
 def test_a_snap_says_what_is_to_be_thought_of_it(server: LiveServer, operator: httpx.Client) -> None:

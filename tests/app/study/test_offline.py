@@ -35,7 +35,11 @@ class HandMade:
         self.services = services
         self.clock = SimulatedClock("test", utc_now())
         self.desk = Desk(
-            services.database, EventLog(services.database, self.clock), services.data, services.snapper
+            services.database,
+            EventLog(services.database, self.clock),
+            services.data,
+            services.snapper,
+            services.standards,
         )
 
     def register(self, name: str, *poses: np.ndarray, frame_id: int | None = None) -> int:
