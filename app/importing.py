@@ -16,8 +16,8 @@ from app.database import Database
 from app.scene_data import symmetries_to_json
 from app.start_pose import start_pose
 from app.storage import FileStore
-from app.symmetries import first_version, open_suggestions, suggest
-from app.tables import Dataset, Frame, Object, Scene, SymmetrySuggestions, Task
+from app.symmetries import first_version, keep_suggestions, open_suggestions, suggest
+from app.tables import Dataset, Frame, Object, Scene, Task
 from registration_core import ObjectModel, Symmetries
 from registration_core.bop import BopDataset, BopImage, BopObject, BopScene, read_dataset, read_depth
 from registration_core.viewpoint_model import check_visible
@@ -102,8 +102,7 @@ def import_dataset(
     report = partial(progress, 1.0, "looking for symmetries") if progress else lambda: None
     suggested = suggest(database, plain, report)
     with database.write() as session:
-        for mesh_hash, suggestions in suggested.items():
-            session.merge(SymmetrySuggestions(mesh_hash=mesh_hash, suggestions=suggestions))
+        keep_suggestions(session, suggested)
         return _Importer(session, stored, name).run(source, worlds)
 
 

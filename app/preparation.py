@@ -1,4 +1,6 @@
-"""Has the objects of all datasets built before anybody snaps to them, one after another."""
+"""Has the objects of all datasets built before anybody snaps to them, one after another, and suggests the
+symmetries of those that an older version imported.
+"""
 
 import json
 import logging
@@ -10,6 +12,7 @@ from app import worker
 from app.database import Database
 from app.scene_data import SceneData
 from app.snapping import Snapper
+from app.symmetries import keep_suggestions, never_looked_into, suggest
 from app.tables import Object
 
 logger = logging.getLogger(__name__)
@@ -23,7 +26,8 @@ Key = tuple[str, str, str]
 
 
 class Preparation:
-    """Looks for objects that workers have not built yet, and lets them do so.
+    """Looks for objects that workers have not built yet, and lets them do so; then for symmetries of those
+    that an older version imported.
 
     What is built is kept at once, so a server that is stopped goes on where it was; and what was built by
     another algorithm counts as missing, so an update has all of it built again.
@@ -77,6 +81,7 @@ class Preparation:
             self._wanted.clear()
             try:
                 self._prepare_all()
+                self._suggest_all()
             except Exception:  # what is missing is looked for again
                 if not self._closed:
                     logger.exception("objects could not be prepared")
@@ -91,6 +96,22 @@ class Preparation:
                 self._prepare(item, number < KNOWN_AHEAD)
         hashes = [self._hashes[key] for key in map(_key, items) if key in self._hashes]
         self._snapper.hand_over(hashes[:KNOWN_AHEAD])  # to workers that came meanwhile
+
+    def _suggest_all(self) -> None:
+        with self._database.read() as session:
+            items = {item.mesh_hash: item for item in never_looked_into(session)}
+        for mesh_hash, item in items.items():
+            if self._closed:
+                return
+            if self.problem(item) is not None:
+                continue
+            try:
+                found = suggest(self._database, {mesh_hash: self._data.model(item)})
+            except Exception as error:  # it stops no other; the next look tries again
+                logger.warning("symmetries of object %d could not be looked for: %s", item.id, error)
+                continue
+            with self._database.write() as session:
+                keep_suggestions(session, found)
 
     def _prepare(self, item: Object, ahead: bool) -> None:
         try:

@@ -26,7 +26,7 @@ class OutdatedError(Exception):
 
 
 def suggest(
-    database: Database, models: Mapping[str, ObjectModel], report: Callable[[], None]
+    database: Database, models: Mapping[str, ObjectModel], report: Callable[[], None] = lambda: None
 ) -> dict[str, list[Any]]:
     """Suggested axes by the hash of the mesh, for those of `models` that were never looked into.
 
@@ -43,6 +43,22 @@ def suggest(
         axes = find_symmetries(models[mesh_hash])
         found[mesh_hash] = [axis_to_json(axis) | {"residual": axis.residual} for axis in axes]
     return found
+
+
+def keep_suggestions(session: Session, found: Mapping[str, list[Any]]) -> None:
+    """Keep what was found on meshes, and mark objects that it leaves something to decide about."""
+    for mesh_hash, suggestions in found.items():
+        session.merge(SymmetrySuggestions(mesh_hash=mesh_hash, suggestions=suggestions))
+    session.flush()
+    for row in session.scalars(select(Object).where(Object.mesh_hash.in_(found))):
+        open_suggestions(session, row)
+
+
+def never_looked_into(session: Session) -> list[Object]:
+    """Objects without symmetries whose mesh was not looked into, since an older version imported them."""
+    known = select(SymmetrySuggestions.mesh_hash)
+    rows = session.scalars(select(Object).where(Object.mesh_hash.not_in(known)).order_by(Object.id.desc()))
+    return [row for row in rows if _is_none(row.symmetries)]
 
 
 def first_version(session: Session, row: Object) -> None:

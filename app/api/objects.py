@@ -70,7 +70,7 @@ class ObjectDetail(ObjectOut):
     axes: list[AxisOut] = Field(description="Which the present symmetries are made of.")
     suggestions: list[SuggestionOut] | None = Field(
         description="Best first; null where the mesh was never looked into: it came with symmetries, or was "
-        "imported by an older version; then import it again."
+        "imported by an older version, and has not had its turn yet."
     )
     undo_version: int | None = Field(description="The version that undo restores.")
 

@@ -144,7 +144,7 @@ function drawPresent() {
 function nothingText(suggestions) {
   if (item.suggestions_open) return "None, until somebody decides.";
   if (item.symmetries_version > 1) return "None, as was decided.";
-  if (suggestions === null) return "None. The mesh was never looked into: import the dataset again to have it done.";
+  if (suggestions === null) return "None so far. The server looks into the mesh in the background: come back in a moment.";
   return "None, and none were found on the mesh.";
 }
 

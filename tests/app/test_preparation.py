@@ -3,18 +3,24 @@
 from collections.abc import Iterator
 from contextlib import closing
 
+import numpy as np
 import pytest
-from sqlalchemy import select
+from sqlalchemy import delete, select, update
 
+from app.auth import Role
 from app.preparation import Preparation
 from app.scene_data import symmetries_to_json
 from app.services import Services
-from app.tables import Object
-from registration_core import Symmetries
+from app.symmetries import decide, suggestions_of
+from app.tables import Object, SymmetrySuggestions
+from registration_core import Symmetries, SymmetryAxis
 from registration_core.object_model import ContinuousSymmetry
+from tests.app.small_dataset import BLOCK, TOOL
 from tests.app.test_importing import THREAD_MESH
 from tests.app.test_snapping import knowing
 from tests.app.waiting import wait_until
+
+HALF_TURN = SymmetryAxis(np.array([0.0, 0.0, 1.0]), np.zeros(3), 2)
 
 
 @pytest.fixture
@@ -30,6 +36,11 @@ def objects_of(services: Services) -> list[Object]:
 
 def hashes_of(services: Services) -> list[str]:
     return [services.data.model(item).content_hash for item in objects_of(services)]
+
+
+def suggested(services: Services, item: Object) -> list | None:
+    with services.database.read() as session:
+        return suggestions_of(session, item)
 
 
 def wait_until_prepared(services: Services) -> None:
@@ -56,6 +67,34 @@ def test_new_symmetries_are_built_when_it_looks_again(services, preparation):
     assert [preparation.is_prepared(item) for item in objects_of(services)].count(False) == 1
     preparation.look()
     wait_until_prepared(services)
+
+
+def test_symmetries_of_objects_from_before_there_were_suggestions_are_suggested(services, preparation):
+    with services.database.write() as session:
+        session.execute(delete(SymmetrySuggestions))
+        session.execute(update(Object).values(suggestions_open=False))
+    block, tool = (next(item for item in objects_of(services) if item.obj_id == id_) for id_ in (BLOCK, TOOL))
+    preparation.start()
+    wait_until(lambda: None not in (suggested(services, block), suggested(services, tool)), "suggestions")
+    assert [entry["fold"] for entry in suggested(services, block)] == [4, 2, 2, 2, 2]
+    assert suggested(services, tool) == []
+    assert [item.obj_id for item in objects_of(services) if item.suggestions_open] == [BLOCK]
+
+
+def test_what_came_with_symmetries_or_was_decided_is_left_in_peace(services, preparation):
+    lead = services.auth.create_user("lea", Role.ADMIN).id
+    with services.database.write() as session:
+        session.execute(delete(SymmetrySuggestions))
+        session.execute(update(Object).values(suggestions_open=False))
+        rows = session.scalars(select(Object)).all()
+        block, tool = (next(row for row in rows if row.obj_id == id_) for id_ in (BLOCK, TOOL))
+        decide(session, block, [], services.data.model(block), lead, None)  # it has none, somebody said
+        decide(session, tool, [HALF_TURN], services.data.model(tool), lead, None)
+    preparation.start()
+    wait_until(lambda: suggested(services, block), "suggestions")
+    wait_until_prepared(services)
+    assert suggested(services, tool) is None
+    assert not any(item.suggestions_open for item in objects_of(services))
 
 
 def test_an_object_that_cannot_be_built_says_why_and_stops_no_other(services, preparation):
