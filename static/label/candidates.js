@@ -14,7 +14,7 @@ const SAME = 1e-9; // metres, and entries of a rotation
 export function candidatesPart(page) {
   let frames = [];
   let drawing = null; // promised
-  let source = null; // {kind, id, url}
+  let source = null; // {kind, id, url, symmetries}
   let cards = [];
   let chosen = -1; // the one that is looked at
   let sending = false;
@@ -30,7 +30,8 @@ export function candidatesPart(page) {
 
   function draw(registration) {
     const newest = sourceOf(registration);
-    if (newest?.id !== source?.id) {
+    if (newest?.id !== source?.id || newest?.symmetries !== source?.symmetries) {
+      if (newest && newest.id === source?.id) leave();
       source = newest;
       show([]);
       if (source) load(source).catch(page.message.problem);
@@ -40,7 +41,7 @@ export function candidatesPart(page) {
 
   async function load(wanted) {
     const [{ mesh, drawOn }, answer] = await Promise.all([drawing, get(wanted.url)]);
-    if (wanted !== source) return;
+    if (wanted !== source || isOutdated(wanted, answer)) return;
     const { frame_id: frameId, poses } = posesOf(wanted, answer);
     const frame = frames.find(({ id }) => id === frameId);
     const withWorld = poses.map((one) => ({ ...one, T_world_object: product(frame.T_world_camera, one.T_camera_object) }));
@@ -133,11 +134,17 @@ export function candidatesPart(page) {
 }
 
 /** Where the poses to choose from come from now; null where there are none. */
-function sourceOf({ state, search, offer, estimate_snap_id: snapId }) {
+function sourceOf({ state, search, offer, estimate_snap_id: snapId, symmetries_version: symmetries }) {
   if (state !== "open") return null;
   if (search?.state === "done") return { kind: "proposal", id: search.id, url: `/api/searches/${search.id}` };
   const id = offer?.snap_id ?? snapId;
-  return id ? { kind: "mode", id, url: `/api/snaps/${id}` } : null;
+  return id ? { kind: "mode", id, url: `/api/snaps/${id}`, symmetries } : null;
+}
+
+/** Whether the object had other symmetries when it was snapped: what was told apart then may be one pose now. */
+function isOutdated({ symmetries }, { estimate }) {
+  const then = estimate?.symmetries_version ?? null; // null: an older version did not keep it
+  return then !== null && then !== symmetries;
 }
 
 function posesOf({ kind }, { candidates, frame_id: frameId, estimate }) {
