@@ -24,7 +24,9 @@ from sqlalchemy.orm import (
     Mapped,
     column_property,
     mapped_column,
+    query_expression,
     relationship,
+    with_expression,
 )
 
 Pose = list[list[float]]
@@ -269,6 +271,8 @@ class Registration(Base):
     submitted_at: Mapped[datetime | None]
     task: Mapped[Task] = relationship(back_populates="registrations")
     user: Mapped[User] = relationship()
+    last_assessment: Mapped[dict[str, Any] | None] = query_expression()
+    """That of its newest estimate, where a query asks for it by `LAST_ASSESSMENT`."""
 
 
 class Event(Base):
@@ -440,6 +444,16 @@ class OfflineSnap(Base):
     """As that of an estimate."""
     hardware: Mapped[str] = mapped_column(String(200))
 
+
+LAST_ASSESSMENT = with_expression(
+    Registration.last_assessment,
+    select(EstimateRow.assessment)
+    .where(EstimateRow.registration_id == Registration.id)
+    .order_by(EstimateRow.id.desc())
+    .limit(1)
+    .scalar_subquery(),
+)
+"""An option of queries for registrations: what was thought of the machine's last estimate of each."""
 
 OUTSIDE_STUDIES = Registration.user_id.not_in(select(Participant.user_id))
 """Registrations of the ordinary work, which what participants of studies do never mixes with."""

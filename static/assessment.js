@@ -20,6 +20,18 @@ export function drawAssessment(node, assessment) {
   );
 }
 
+/** The verdict in short, with its reasons to be read on it. */
+export function verdictMark(assessment) {
+  const { verdict } = assessment;
+  return element(
+    "span",
+    { className: "assessment", "data-assessed": verdict, title: sentenceOf(assessment) },
+    icon(ICONS[verdict]),
+    element("span", { className: "visually-hidden" }, "the machine’s last estimate: "),
+    verdict,
+  );
+}
+
 function sentenceOf({ verdict, reasons }) {
   return `${verdict}: ${reasons.join("; ")}`;
 }

@@ -23,14 +23,25 @@ from app.api.dependencies import (
     page_of,
 )
 from app.api.problems import InputError
-from app.api.registration_state import RegistrationOut, registration_out
+from app.api.registration_state import AssessmentOut, RegistrationOut, registration_out
 from app.auth import Identity, Role
 from app.labeling.tools import methods_of
 from app.scene_data import camera_of
 from app.services import Services
 from app.start_pose import start_pose
 from app.study.participation import require_turn
-from app.tables import OUTSIDE_STUDIES, Condition, Frame, Method, Mode, Object, Registration, Scene, Task
+from app.tables import (
+    LAST_ASSESSMENT,
+    OUTSIDE_STUDIES,
+    Condition,
+    Frame,
+    Method,
+    Mode,
+    Object,
+    Registration,
+    Scene,
+    Task,
+)
 from app.thumbnails import task_thumbnail
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
@@ -80,6 +91,9 @@ class OperatorRef(BaseModel):
     state: str
     skip_reason: str | None
     registration_id: int
+    assessment: AssessmentOut | None = Field(
+        description="Of the machine's last estimate, for reviewers; null where there is none."
+    )
 
 
 class TaskOut(BaseModel):
@@ -229,7 +243,7 @@ def _tasks() -> Select[Task]:
         joinedload(Task.object),
         joinedload(Task.frame),
         undefer(Task.instances),
-        selectinload(Task.registrations).joinedload(Registration.user),
+        selectinload(Task.registrations).options(joinedload(Registration.user), LAST_ASSESSMENT),
     )
 
 
@@ -272,12 +286,15 @@ def _out_for(identity: Identity) -> Callable[[Task], TaskOut]:
     def out(row: Task) -> TaskOut:
         mine = [r for r in row.registrations if r.user_id == identity.user_id]
         ordinary = [r for r in row.registrations if r.user.role != Role.PARTICIPANT]
-        return _out(row, mine if identity.role is Role.PARTICIPANT else ordinary, mine)
+        shown = mine if identity.role is Role.PARTICIPANT else ordinary
+        return _out(row, shown, mine, identity.role.includes(Role.REVIEWER))
 
     return out
 
 
-def _out(row: Task, registrations: Sequence[Registration], mine: Sequence[Registration]) -> TaskOut:
+def _out(
+    row: Task, registrations: Sequence[Registration], mine: Sequence[Registration], for_reviewers: bool
+) -> TaskOut:
     return TaskOut(
         id=row.id,
         dataset=Named(id=row.scene.dataset.id, name=row.scene.dataset.name),
@@ -291,7 +308,15 @@ def _out(row: Task, registrations: Sequence[Registration], mine: Sequence[Regist
         method=row.method,
         state=_state_of(registrations),
         operators=[
-            OperatorRef(name=r.user.name, state=r.state, skip_reason=r.skip_reason, registration_id=r.id)
+            OperatorRef(
+                name=r.user.name,
+                state=r.state,
+                skip_reason=r.skip_reason,
+                registration_id=r.id,
+                assessment=AssessmentOut(**r.last_assessment)
+                if for_reviewers and r.last_assessment
+                else None,
+            )
             for r in registrations
         ],
         mine=mine[0].id if mine else None,

@@ -1,6 +1,7 @@
 /** The tasks as cards, filtered by dataset, scene and state. The filter is kept in the page's address. */
 
 import { get, getAll } from "../api.js";
+import { verdictMark } from "../assessment.js";
 import { byId, element, icon, picture, setText } from "../dom.js";
 import { count, METHODS, taskName } from "../format.js";
 
@@ -122,14 +123,18 @@ function sceneText({ scene, method }) {
   return method === "default" ? scene.label : `${scene.label} · ${METHODS[method].name}`;
 }
 
-/** The object's page; and who submitted the task, each name leading to the replay: one's own, or all for a reviewer. */
+/**
+ * The object's page; and who submitted the task, each name leading to the replay: one's own, or all for a
+ * reviewer, who also sees what is to be thought of the machine's last estimate.
+ */
 function cardLinks({ operators, object }, me) {
   const page = element("a", { href: `/objects/${object.id}`, "aria-label": `Object ${object.name}` }, "Object");
   const links = operators
     .filter(({ name, state }) => state === "submitted" && (name === me.name || me.role !== "operator"))
-    .map(({ name, registration_id: id }) => {
+    .flatMap(({ name, registration_id: id, assessment }) => {
       const shown = name === me.name ? "you" : name;
-      return element("a", { href: `/replay/${id}`, "aria-label": `Replay of ${shown}` }, shown);
+      const link = element("a", { href: `/replay/${id}`, "aria-label": `Replay of ${shown}` }, shown);
+      return assessment ? [link, verdictMark(assessment)] : [link];
     });
   const replays = links.length ? [icon("play"), "Replay", ...links] : [];
   return element("p", { className: "card-links" }, icon("cube"), page, ...replays);

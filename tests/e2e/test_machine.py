@@ -220,6 +220,12 @@ def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
         f"posed by the machine, {assessment['confidence']:.2f}, look"
     )
     take_picture(page, "replay-look")
-    page.goto(desk.root)
+    page.goto(f"{desk.root}/?state=submitted")
     expect(page.locator("#datasets")).to_contain_text("calibrated from 200 registrations")
+    verdict = page.locator(f"li:has([data-task-id='{desk.task['id']}']) .card-links .assessment")
+    expect(verdict).to_have_text("the machine’s last estimate: look")
+    expect(verdict).to_have_attribute("title", f"look: {'; '.join(assessment['reasons'])}")
+    verdict.scroll_into_view_if_needed()
     take_picture(page, "home-calibrated")
+    page.emulate_media(color_scheme="dark")
+    take_picture(page, "home-calibrated-dark")

@@ -4,6 +4,7 @@ import httpx
 import numpy as np
 import pytest
 
+from app.auth import Role
 from app.config import RISK
 from app.tables import CalibrationRow
 from registration_core import ALGORITHM, acceptance, pose
@@ -93,6 +94,19 @@ def test_a_snap_says_what_is_to_be_thought_of_it(server: LiveServer, operator: h
     state = operator.get(url_of(registration)).json()
     assert state["assessment"] == assessment
     assert state["confidence"] == assessment["confidence"]
+
+
+def test_leads_see_in_the_list_what_to_look_at(own_live: LiveServer) -> None:
+    worker, lead = own_live.script("worker"), own_live.script("lead", Role.REVIEWER)
+    registration = begin(worker)
+    put_pose(worker, registration, NEAR)
+    for seed in (7, 8):
+        snap_id = worker.post(f"{url_of(registration)}/snaps", json={"seed": seed}).json()["id"]
+        last = finished_snap(worker, snap_id)["estimate"]["assessment"]
+    begin(own_live.script("idler"))
+    seen_by = lambda who: [one["assessment"] for one in who.get("/api/tasks").json()["items"][0]["operators"]]  # noqa: E731
+    assert seen_by(lead) == [last, None]
+    assert seen_by(worker) == [None, None]
 
 
 def test_a_dataset_tells_of_its_calibration(server: LiveServer, operator: httpx.Client) -> None:

@@ -34,7 +34,13 @@ def test_skipping_and_reopening(own_live: LiveServer) -> None:
     assert (skipped["state"], skipped["skip_reason"]) == ("skipped", "ambiguous")
     assert "was skipped" in sentence(ann.post(f"{url}/undo"), 409)
     (task,) = ann.get("/api/tasks?state=skipped").json()["items"]
-    ended = {"name": "ann", "state": "skipped", "skip_reason": "ambiguous", "registration_id": mine["id"]}
+    ended = {
+        "name": "ann",
+        "state": "skipped",
+        "skip_reason": "ambiguous",
+        "registration_id": mine["id"],
+        "assessment": None,
+    }
     assert task["operators"] == [ended]
     for client in (ann, bob):
         assert client.get("/api/tasks/next").json()["id"] != task["id"]
