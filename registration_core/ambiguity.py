@@ -53,7 +53,8 @@ def _other_modes(modes: Array, masses: Array, model: ViewpointModel) -> list[Amb
     found = []
     for mode in modes[1:][masses[1:] >= LIKE_WEIGHT * masses[0]]:
         twins = pose.inverse(modes[0]) @ mode @ from_rows(model.symmetries)
-        difference = min((pose.log(twin) for twin in twins), key=lambda twist: np.linalg.norm(twist[3:]))
+        least_turned = np.argmax(np.trace(twins[:, :3, :3], axis1=1, axis2=2))
+        difference = pose.log(twins[least_turned])
         angle, length = float(np.linalg.norm(difference[3:])), float(np.linalg.norm(difference[:3]))
         if angle >= LEAST_TURN:
             found.append(Ambiguity("other mode", "turn", tuple(difference[3:] / angle), angle))

@@ -1,4 +1,6 @@
-"""How likely the result is right: the mass of the winning mode, and how well it fits by itself."""
+"""How likely the result is right: the belief that lies near it, and how well it fits by itself."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +15,16 @@ from registration_core.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]
 
-FEATURES = ("intercept", "mass", "score", "match", "inner match", "shown", "contrast")
-"""What speaks for a winner: 1, the logit of its mode's share of the belief, its score in log-odds, the share
-of its claim that was measured where it is claimed, the same away from rims, the share that is not hidden, and
-the share of its outline where the surface ends.
+FEATURES = ("intercept", "belief", "score", "match", "inner match", "shown", "contrast")
+"""What speaks for a winner: 1, the logit of the share of the belief that lies within EXACT of it, its score
+in log-odds, the share of its claim that was measured where it is claimed, the same away from rims, the share
+that is not hidden, and the share of its outline where the surface ends.
 """
+EXACT = 0.05
+"""MSSD below which a pose is right, share of the diameter."""
 NO_MASS = 10.0
 """Log-odds behind the best from which on a candidate has no share of the belief worth counting."""
-MOST_MASS = 0.998
+MOST_BELIEF = 0.998
 """No share of the belief counts as more: others were not looked at."""
 LEAST_INNER = 0.1
 """Share of the mean silhouette: no smaller an inner part is trusted in its match."""
@@ -35,74 +39,92 @@ ASTRAY = 0.02
 """... no more than this share of the points."""
 
 
-def modes_of(poses: Array32, model: ViewpointModel, radius: float) -> NDArray[np.intp]:
-    """For each of the poses (N, 3, 4), best first, the index of the best pose whose mode it belongs to.
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Candidates in groups that are one mode each, the winner's first and then best first."""
+
+    best: NDArray[np.intp]
+    """(M,), the index of each mode's best candidate."""
+    masses: Array
+    """(M,), the share of the belief of each: the softmax over the best scores."""
+    near: Array
+    """(M,), the share of all candidates' belief that lies within EXACT of each mode's best."""
+
+
+def modes_of(apart: Array32, radius: float) -> NDArray[np.intp]:
+    """For each of N poses, best first, the index of the best pose whose mode it belongs to.
 
     Args:
-        radius: poses whose MSSD is below this share of the diameter are one mode; symmetric twins are.
+        apart: (N, N), their MSSD, shares of the diameter.
+        radius: poses that are less far apart are one mode; symmetric twins are.
     """
-    apart = np.empty((len(poses), len(poses)), np.float32)
-    distances(poses, model.extremes, model.symmetries, apart)
-    close = apart < radius * model.diameter
+    close = apart < radius
     np.fill_diagonal(close, True)
-    mode = np.full(len(poses), -1, dtype=np.intp)
-    for i in range(len(poses)):
+    mode = np.full(len(apart), -1, dtype=np.intp)
+    for i in range(len(apart)):
         if mode[i] < 0:
             mode[close[i] & (mode < 0)] = i
     return mode
 
 
-def mode_masses(scores: Array, modes: NDArray[np.intp]) -> Array:
-    """Softmax (M,) over the best score of each mode, in the order of `np.unique(modes)`; scores are
-    log-odds.
-    """
-    best = np.array([scores[modes == mode].max() for mode in np.unique(modes)])
-    mass = np.exp(best - best.max())
-    return mass / mass.sum()
+def softmax(scores: Array) -> Array:
+    """Shares (N,) of the belief, of log-odds (N,)."""
+    belief = np.exp(scores - scores.max())
+    return belief / belief.sum()
 
 
 def grouped(
     poses: Array32, winner: int, scores: Array, model: ViewpointModel, config: ConfidenceConfig
-) -> tuple[NDArray[np.intp], Array]:
-    """Indices of the modes among poses (N, 3, 4), the winner's first and then best first, and the mass of
-    each.
-
-    Args:
-        scores: (N,), log-odds.
-    """
+) -> Modes:
+    """The modes among poses (N, 3, 4) of these scores (N,), log-odds."""
     order = np.argsort(-scores, kind="stable")
     order = order[scores[order] > scores.max() - NO_MASS]
     order = np.concatenate([[winner], order[order != winner]])
-    modes = modes_of(poses[order], model, config.mode_radius)
-    masses = mode_masses(scores[order], modes)
-    best_first = np.concatenate([[0], 1 + np.argsort(-masses[1:], kind="stable")])
-    return order[np.unique(modes)][best_first], masses[best_first]
+    apart = np.empty((len(order), len(order)), np.float32)
+    distances(poses[order], model.extremes, model.symmetries, apart)
+    apart /= model.diameter
+    modes = modes_of(apart, config.mode_radius)
+    firsts = np.unique(modes)
+    masses = softmax(np.array([scores[order][modes == first].max() for first in firsts]))
+    near = (apart[firsts] < EXACT) @ softmax(scores[order])
+    ranks = np.concatenate([[0], 1 + np.argsort(-masses[1:], kind="stable")])
+    return Modes(order[firsts[ranks]], masses[ranks], near[ranks])
 
 
-def belief_in_first(poses: Array32, masses: Array, model: ViewpointModel) -> float:
-    """Share of the belief that the first of the modes (M, 3, 4), of masses (M,), has together with those that
-    depth cannot tell from it.
+def belief_in_first(modes: Modes, poses: Array32, model: ViewpointModel) -> float:
+    """Share of the belief near the first of the modes, and near those that depth cannot tell from it.
+
+    Args:
+        poses: (M, 3, 4), the modes' best.
     """
-    return float(masses[0] + masses[twins_of_first(poses, masses, model)].sum())
+    alike = np.concatenate([[0], twins_of_first(poses, modes.masses, model)])
+    return min(1.0, float(modes.near[alike].sum()))
 
 
 def twins_of_first(poses: Array32, masses: Array, model: ViewpointModel) -> NDArray[np.intp]:
     """Indices of the poses (M, 3, 4) that put the same surface there as the first one, whatever symmetries
-    the object is said to have. Those of little mass are not looked at.
+    the object is said to have. Those of little mass (M,) are not looked at.
     """
-    weighty = 1 + np.flatnonzero(masses[1:] >= LIKE_WEIGHT * masses[0])
-    if not len(weighty):
-        return weighty
+    alike = 1 + np.flatnonzero(masses[1:] >= LIKE_WEIGHT * masses[0])
+    for points in (model.extremes, model.sample):  # a few that move most tell nearly all apart
+        if len(alike):
+            alike = alike[_astray(poses, alike, points, model) <= ASTRAY]
+    return alike
+
+
+def _astray(poses: Array32, others: NDArray[np.intp], points: Array32, model: ViewpointModel) -> Array:
+    """Share of the points (P, 3) of the surface that each of the other poses puts off the first one's."""
     rows = from_rows(poses)
-    relative = np.linalg.inv(rows[0]) @ rows[weighty]
-    moved = np.einsum("mij,pj->mpi", relative[:, :3, :3], model.sample) + relative[:, None, :3, 3]
+    relative = np.linalg.inv(rows[0]) @ rows[others]
+    moved = np.einsum("mij,pj->mpi", relative[:, :3, :3], points) + relative[:, None, :3, 3]
     apart, _ = model.surface_tree.query(moved.reshape(-1, 3), distance_upper_bound=0.1 * model.diameter)
-    astray = np.mean(apart.reshape(len(weighty), -1) > SAME_SURFACE * model.diameter, axis=1)
-    return weighty[astray <= ASTRAY]
+    return np.mean(apart.reshape(len(others), -1) > SAME_SURFACE * model.diameter, axis=1)
 
 
-def features(masses: Array, scores: Array, counts: Array) -> Array:
-    """The FEATURES (N, F) of winners with shares of the belief (N,), scores (N,) and counts (N, COUNT)."""
+def features(beliefs: Array, scores: Array, counts: Array) -> Array:
+    """The FEATURES (N, F) of winners with shares of the belief near them (N,), scores (N,) and counts
+    (N, COUNT).
+    """
     inner = counts[:, : evidence.INSIDE_BINS]
     matched = inner[:, evidence.MATCHED] + inner[:, evidence.MATCHED_ON_PLANE]
     visible = inner.sum(axis=1) - inner[:, list(evidence.HIDDEN)].sum(axis=1)
@@ -111,7 +133,7 @@ def features(masses: Array, scores: Array, counts: Array) -> Array:
     return np.stack(
         [
             np.ones(len(counts)),
-            logit(np.clip(masses, 1.0 - MOST_MASS, MOST_MASS)),
+            logit(np.clip(beliefs, 1.0 - MOST_BELIEF, MOST_BELIEF)),
             scores,
             match_shares(counts),
             matched / np.maximum(visible, LEAST_INNER),
@@ -122,13 +144,13 @@ def features(masses: Array, scores: Array, counts: Array) -> Array:
     )
 
 
-def confidence(mass: float, score: float, counts: Array, config: ConfidenceConfig) -> float:
+def confidence(belief: float, score: float, counts: Array, config: ConfidenceConfig) -> float:
     """Probability in [0, 1] that the MSSD is below 5 % of the diameter.
 
     Args:
-        mass: share of the belief in the winning mode, as `belief_in_first` gives it.
+        belief: share of the belief near the winner, as `belief_in_first` gives it.
         score: log-odds of the winner, as `selection.scores` gives them.
         counts: (evidence.COUNT,), of the winner.
     """
-    speaks = features(np.array([mass]), np.array([score]), counts[None])[0]
+    speaks = features(np.array([belief]), np.array([score]), counts[None])[0]
     return float(expit(speaks @ np.array(config.weights)))

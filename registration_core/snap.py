@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from registration_core.camera import Intrinsics
+from registration_core.confidence import confidence
 from registration_core.estimate import Estimate, SnapStep
 from registration_core.kernels import to_rows
 from registration_core.likelihood import RenderedLikelihood
@@ -22,7 +23,7 @@ from registration_core.search import search_of
 from registration_core.seeding import seed_of
 from registration_core.snap_config import SnapConfig
 from registration_core.snap_run import Sighting, SnapRun
-from registration_core.verdict import certainty, judged, nothing_seen, outcome, progress, verdict
+from registration_core.verdict import judged, nothing_seen, outcome, progress, standing, verdict
 from registration_core.viewpoint_model import Registrable
 
 
@@ -95,20 +96,18 @@ def _viewpoint_steps(run: SnapRun) -> Iterator[SnapStep]:
     iterations = 2 + len(config.rounds) * (1 + len(config.stages))
     candidates = np.concatenate([run.problem.prior.start[None], run.polished_start()])
     counts = run.evidence(candidates)
-    judgement = run.judge(candidates, counts)
-    iteration, best, known = 1, candidates[[judgement.winner]], judgement.of_winner
-    yield progress(run, iteration, iterations, best, *known)
+    now, iteration = standing(run, candidates, counts), 1
+    yield progress(run, iteration, iterations, now.best, now.confidence)
     for one in config.rounds:
-        if certainty(run, candidates, judgement) > one.doubt:
+        if now.confidence > one.doubt:
             continue
         for poses in run.round(one.share, one.widening):
             iteration += 1
-            yield progress(run, iteration, iterations, np.concatenate([best, poses]), *known)
+            yield progress(run, iteration, iterations, np.concatenate([now.best, poses]), now.confidence)
         candidates = np.concatenate([candidates, poses])
         counts = np.concatenate([counts, run.evidence(poses)])
-        judgement = run.judge(candidates, counts)
-        best, known = candidates[[judgement.winner]], judgement.of_winner
-    yield verdict(run, iteration + 1, candidates, judgement)
+        now = standing(run, candidates, counts)
+    yield verdict(run, iteration + 1, now)
 
 
 def _filter_steps(run: SnapRun) -> Iterator[SnapStep]:
@@ -130,6 +129,7 @@ def _filter_steps(run: SnapRun) -> Iterator[SnapStep]:
         order = np.argsort(-particles.log_weights, kind="stable")
         ranked = to_rows(particles.poses[order])
         if iteration < config.iterations:
-            yield progress(run, iteration, config.iterations, ranked, *judged(run, ranked[0]))
+            sure = confidence(1.0, *judged(run, ranked[0]), problem.config.confidence)
+            yield progress(run, iteration, config.iterations, ranked, sure)
         else:
             yield outcome(run, iteration, ranked, particles.log_weights[order])

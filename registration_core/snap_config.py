@@ -189,7 +189,7 @@ class AnywhereConfig:
 DEFAULT_STAGES = (
     StageConfig(1500, 0.015, 0.25, 4, 0.03, 0.012, 64, 0.010),
     StageConfig(400, 0.008, 0.12, 6, 0.012, 0.005, 160, 0.006),
-    StageConfig(150, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
+    StageConfig(160, 0.003, 0.05, 4, 0.006, 0.004, 256, 0.006),
 )
 
 
@@ -205,8 +205,11 @@ class RoundConfig:
     """The round is left out where the confidence so far is higher than this."""
 
 
-ROUNDS = ((0.3, 1.0), (0.5, 1.4), (0.8, 1.6))
+ROUNDS = ((0.4, 1.1), (0.5, 1.4), (0.8, 1.6))
 """Share and widening of each; from which confidence on one is left out is fitted."""
+ALWAYS = 1
+"""Of them, the first so many are never left out: how sure a pose is cannot be told before rivals were looked
+for."""
 DEFAULT_ROUNDS = tuple(
     RoundConfig(share, widening, doubt)
     for (share, widening), doubt in zip(ROUNDS, FITTED.doubts, strict=True)

@@ -1,6 +1,7 @@
 """What a snap tells its caller, of one view or several: progress on the way, the estimate at the end."""
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from registration_core.agreement import heavy_tails
 from registration_core.ambiguity import ambiguities
 from registration_core.certificates import certified
-from registration_core.confidence import belief_in_first, confidence, grouped
+from registration_core.confidence import Modes, belief_in_first, confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct
@@ -26,50 +27,63 @@ PARTICLE_TEMPERATURE = 0.03
 """Difference of Eq. 5 between two modes of the particle filter that counts as one unit of log-odds."""
 
 
-def progress(
-    run: SnapRun, iteration: int, iterations: int, poses: Array32, score: float, counts: Array
-) -> SnapStep:
-    """A step with the hypotheses alive, (N, 3, 4), the one judged best first; its confidence takes that one's
-    mode for the only.
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """What the candidates so far come to."""
 
-    Args:
-        score, counts: what the evidence says of the best.
-    """
+    candidates: Array32
+    """(N, 3, 4), the start first."""
+    judgement: Judgement
+    modes: Modes
+    """The winner's first."""
+    confidence: float
+
+    @property
+    def best(self) -> Array32:
+        """(1, 3, 4), the winner."""
+        return self.candidates[[self.judgement.winner]]
+
+
+def standing(run: SnapRun, candidates: Array32, counts: Array) -> Standing:
+    """What candidates (N, 3, 4) of evidence (N, COUNT) come to: the start, its polishes, and other modes."""
+    judgement, config = run.judge(candidates, counts), run.problem.config.confidence
+    log_odds = judgement.scores / config.temperature
+    modes = grouped(candidates, judgement.winner, log_odds, run.problem.model, config)
+    belief = belief_in_first(modes, candidates[modes.best], run.problem.model)
+    return Standing(candidates, judgement, modes, confidence(belief, *judgement.of_winner, config))
+
+
+def progress(run: SnapRun, iteration: int, iterations: int, poses: Array32, sure: float) -> SnapStep:
+    """A step with the hypotheses alive, (N, 3, 4), the one judged best first, and how sure that one is."""
     return SnapStep(
         iteration,
         iterations,
         run.problem.uncentred(from_rows(poses[:1])[0]),
-        confidence(1.0, score, counts, run.problem.config.confidence),
+        sure,
         run.problem.uncentred_particles(poses),
     )
 
 
-def verdict(run: SnapRun, iteration: int, candidates: Array32, judgement: Judgement) -> SnapStep:
-    """The last step of the fast method: the winner among the candidates (N, 3, 4), the start being the
-    first.
-    """
-    winner = judgement.winner
-    if winner > 0:
-        candidates = candidates.copy()
-        T, hessian = from_rows(candidates[[winner]])[0], run.hessian(candidates[winner])
-        candidates[winner] = to_rows(eased(T, run.problem.start, hessian, run.problem.model.radius))[0]
-    log_odds = _tempered(judgement.scores, run.problem)
-    return _conclusion(run, iteration, candidates, winner, log_odds, *judgement.of_winner)
-
-
-def certainty(run: SnapRun, candidates: Array32, judgement: Judgement) -> float:
-    """The confidence that a `verdict` on these candidates (N, 3, 4) would have."""
-    log_odds = _tempered(judgement.scores, run.problem)
-    modes, masses = _modes(run.problem, candidates, judgement.winner, log_odds)
-    mass = belief_in_first(modes, masses, run.problem.model)
-    return confidence(mass, *judgement.of_winner, run.problem.config.confidence)
+def verdict(run: SnapRun, iteration: int, last: Standing) -> SnapStep:
+    """The last step of the fast method: the winner, eased towards the start where nothing holds it."""
+    modes = last.candidates[last.modes.best]
+    if last.judgement.winner > 0:
+        T, hessian = from_rows(last.best)[0], run.hessian(last.best[0])
+        modes[0] = to_rows(eased(T, run.problem.start, hessian, run.problem.model.radius))[0]
+    _, counts = last.judgement.of_winner
+    return _conclusion(run, iteration, modes, last.modes.masses, last.confidence, counts)
 
 
 def outcome(run: SnapRun, iteration: int, particles: Array32, log_weights: Array) -> SnapStep:
     """The last step of the particle filter: Eq. 2 over its particles (N, 3, 4), best first."""
+    model, config = run.problem.model, run.problem.config.confidence
     kept = distinct(particles, -np.arange(len(particles), dtype=np.float32), 24, 0.003, 0.05)
     log_odds = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
-    return _conclusion(run, iteration, particles[kept], 0, log_odds, *judged(run, particles[0]))
+    modes = grouped(particles[kept], 0, log_odds, model, config)
+    poses = particles[kept[modes.best]]
+    score, counts = judged(run, particles[0])
+    sure = confidence(belief_in_first(modes, poses, model), score, counts, config)
+    return _conclusion(run, iteration, poses, modes.masses, sure, counts)
 
 
 def judged(run: SnapRun, T: Array32) -> tuple[float, Array]:
@@ -94,38 +108,27 @@ def found_anywhere(problem: Problem, candidates: Array32, counts: Array, most: i
         return ()
     candidates, counts = candidates[seen], counts[seen]
     values = scores(counts, np.zeros(len(candidates)), config.selection)
-    log_odds = _tempered(values, problem)
-    modes, masses = grouped(candidates, int(np.argmax(log_odds)), log_odds, problem.model, config.confidence)
-    modes, masses = modes[:most], masses[:most]
-    poses = problem.uncentred(from_rows(candidates[modes]))
+    log_odds = values / config.confidence.temperature
+    modes = grouped(candidates, int(np.argmax(log_odds)), log_odds, problem.model, config.confidence)
+    poses = problem.uncentred(from_rows(candidates[modes.best[:most]]))
+    found = zip(poses, modes.best, modes.masses, modes.near, strict=False)
     return tuple(
-        Hypothesis(T, float(mass), confidence(float(mass), float(values[k]), counts[k], config.confidence))
-        for T, mass, k in zip(poses, masses, modes, strict=True)
+        Hypothesis(T, float(mass), confidence(near, float(values[k]), counts[k], config.confidence))
+        for T, k, mass, near in found
     )
 
 
 def _conclusion(
-    run: SnapRun,
-    iteration: int,
-    candidates: Array32,
-    winner: int,
-    log_odds: Array,
-    score: float,
-    counts: Array,
+    run: SnapRun, iteration: int, modes: Array32, masses: Array, sure: float, counts: Array
 ) -> SnapStep:
-    """The last step: candidates grouped into modes, the winner's first.
+    """The last step: the modes (M, 3, 4), the winner's first, with their masses (M,).
 
     Args:
-        log_odds: (N,), by which the candidates share the belief.
-        score, counts: what the evidence says of the winner.
+        counts: (COUNT,), what the evidence says of the winner.
     """
-    config = run.problem.config
-    if match_shares(counts[None])[0] < config.selection.min_match:
+    if match_shares(counts[None])[0] < run.problem.config.selection.min_match:
         return nothing_seen(run, iteration)
-    modes, masses = _modes(run.problem, candidates, winner, log_odds)
-    mass = belief_in_first(modes, masses, run.problem.model)
-    belief = confidence(mass, score, counts, config.confidence)
-    return _final(run, iteration, modes, masses, belief, True)
+    return _final(run, iteration, modes, masses, sure, True)
 
 
 def _final(
@@ -153,19 +156,6 @@ def _final(
         seed=run.seed,
     )
     return SnapStep(iteration, iteration, poses[0], belief, poses, estimate)
-
-
-def _tempered(scores: Array, problem: Problem) -> Array:
-    """Log-odds (N,) by which candidates of these scores (N,) share the belief."""
-    return scores / problem.config.confidence.temperature
-
-
-def _modes(problem: Problem, candidates: Array32, winner: int, log_odds: Array) -> tuple[Array32, Array]:
-    """The modes (M, 3, 4) of candidates (N, 3, 4), the winner's first and then best first, and their
-    masses (M,).
-    """
-    modes, masses = grouped(candidates, winner, log_odds, problem.model, problem.config.confidence)
-    return candidates[modes], masses
 
 
 def _hypotheses(poses: Array, masses: Array) -> tuple[Hypothesis, ...]:

@@ -29,7 +29,7 @@ VIEW_SUBDIVISIONS = 3
 """Of an icosahedron: 642 directions about 7 degrees apart."""
 CELLS = 32
 """Cells along an edge of the cube map that finds the view of a direction."""
-COARSE_FACES = 1000
+COARSE_FACES = 500
 """Faces of the coarse mesh, at most, where decimation can reach it."""
 DENSE_FACES = 20_000
 """A mesh with more faces is thinned before its views are drawn: more could not be seen in them."""

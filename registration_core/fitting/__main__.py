@@ -18,7 +18,7 @@ from registration_core.fitting.table import FeatureTable, read_table, table_of, 
 from registration_core.fitting.trials import all_trials
 from registration_core.snap_config import SnapConfig
 
-SEED, SCENES = 0, 350
+SEED, SCENES = 0, 800
 
 
 def main() -> int:
@@ -44,8 +44,9 @@ def make(seed: int, scenes: int) -> None:
     trials = all_trials(seed, scenes)
     say(f"{len(trials)} searches in {scenes} scenes")
     table = table_of(trials)
-    judge = numbers.judge_numbers(table)
-    say("the judge is fitted")
+    chosen = numbers.judge_choices(table)
+    say(f"the judge's penalty is {chosen['ridge']}; {len(chosen['removed'])} classes do not help")
+    judge = numbers.judge_numbers(table, **chosen)
     config = SnapConfig()
     fitted = replace(
         config.selection,
@@ -56,15 +57,17 @@ def make(seed: int, scenes: int) -> None:
     table = with_decisions(table, decisions(trials, fitted, config.confidence))
     say("what it makes of all searches is known")
     table.write()
-    made = {"seed": seed, "scenes": scenes}
+    made = {"seed": seed, "scenes": scenes, "judge": chosen}
     PATH.write_text(written(fitted_numbers(table, made)), encoding="utf-8")
     say(f"written to {PATH.name} and table.npz")
     print(json.dumps(json.loads(PATH.read_text(encoding="utf-8"))["made"], indent=2))
 
 
 def fitted_numbers(table: FeatureTable, made: dict[str, Any]) -> dict[str, Any]:
-    """All that `fitted.json` holds."""
-    judge, confidence = numbers.judge_numbers(table), numbers.confidence_numbers(table)
+    """All that `fitted.json` holds, made with a seed, a number of scenes and a penalty, and without some of
+    the judge's classes.
+    """
+    judge, confidence = numbers.judge_numbers(table, **made["judge"]), numbers.confidence_numbers(table)
     doubts = numbers.doubt_numbers(table, confidence)
     return {
         "made": {
@@ -74,10 +77,11 @@ def fitted_numbers(table: FeatureTable, made: dict[str, Any]) -> dict[str, Any]:
             "table_sha256": table.hash(),
             "families": sorted(set(table.families.tolist())),
             "kinds": sorted(set(table.kinds.tolist())),
-            "ridge": {"judge": judge["ridge"], "confidence": calibration.RIDGE},
-            "scores": numbers.scores(table, judge["ridge"], confidence, doubts),
+            "judge": made["judge"],
+            "confidence": {"ridge": calibration.RIDGE},
+            "scores": numbers.scores(table, **made["judge"], confidence=confidence, doubts=doubts),
         },
-        "judge": {name: value for name, value in judge.items() if name != "ridge"},
+        "judge": judge,
         "confidence": confidence,
         "doubts": doubts,
         "calibration": numbers.calibration_numbers(table, confidence, doubts),
@@ -85,7 +89,9 @@ def fitted_numbers(table: FeatureTable, made: dict[str, Any]) -> dict[str, Any]:
 
 
 def check() -> int:
-    """Whether the committed numbers follow from the committed table; what does not is named."""
+    """Whether the committed numbers follow from the committed table, with the penalty and the classes that
+    were chosen by it; what does not is named.
+    """
     committed = json.loads(PATH.read_text(encoding="utf-8"))
     again = fitted_numbers(read_table(), committed["made"])
     wrong = differences(committed, again)

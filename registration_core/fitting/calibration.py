@@ -14,7 +14,7 @@ Flags = NDArray[np.bool_]
 
 RIDGE = 0.003
 """Penalty on the squared weights of features scaled to unit variance, per decision; the intercept is free."""
-LOST = 0.001
+LOST = 0.002
 """Share of all snaps that may end wrong because a further round was left out."""
 
 

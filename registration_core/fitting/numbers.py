@@ -9,9 +9,10 @@ from scipy.special import expit
 from registration_core import evidence
 from registration_core.confidence import FEATURES, features
 from registration_core.fitting import calibration
-from registration_core.fitting.ranking import Choice, best_ridge, fitted_weights, where
+from registration_core.fitting.ranking import Choice, Flags, best_ridge, fitted_weights, needless, where
 from registration_core.fitting.replay import TEMPERATURES
 from registration_core.fitting.table import FeatureTable, from_units
+from registration_core.snap_config import ALWAYS
 
 Array = NDArray[np.float64]
 
@@ -21,22 +22,34 @@ DELTA = 0.1
 """How often the bound on accepted wrong poses may fail over repeated calibrations."""
 
 
-def judge_numbers(table: FeatureTable) -> dict[str, Any]:
-    """Weights of the judgement, with the penalty that predicts kinds and families best which are left out."""
-    choices = table.choices()
-    ridge = best_ridge(choices, [*kind_folds(table), *family_folds(table)])
-    *classes, match_share, prior = fitted_weights(choices, ridge)
+def judge_choices(table: FeatureTable) -> dict[str, Any]:
+    """The penalty of the judge's weights that predicts kinds and families best which are left out, and the
+    names of the classes that do not help to.
+    """
+    choices, kinds = table.choices(), kind_folds(table)
+    ridge = best_ridge(choices, [*kinds, *family_folds(table)])
+    removed = needless(choices, kinds, ridge)
+    return {"ridge": ridge, "removed": [evidence.class_names()[k] for k in removed]}
+
+
+def judge_numbers(table: FeatureTable, ridge: float, removed: list[str]) -> dict[str, Any]:
+    """Weights of the judgement with a penalty, and without the classes of these names."""
+    *classes, match_share, prior = fitted_weights(table.choices(), ridge, class_indices(removed))
     return {
-        "ridge": ridge,
         "classes": calibration.weights_by_name(evidence.class_names(), np.array(classes)),
         "match_share": _short(match_share),
         "prior": _short(prior),
     }
 
 
+def class_indices(names: list[str]) -> list[int]:
+    """Where the classes of these names are."""
+    return [evidence.class_names().index(name) for name in names]
+
+
 def confidence_numbers(table: FeatureTable) -> dict[str, Any]:
     """The temperature and weights of the confidence."""
-    rounds = range(1, table.scores.shape[1])  # after the polish alone nothing else was looked at
+    rounds = range(ALWAYS, table.scores.shape[1])
     losses = []
     for k in range(len(TEMPERATURES)):
         spoken = np.concatenate([decision_features(table, r, k) for r in rounds])
@@ -49,9 +62,10 @@ def confidence_numbers(table: FeatureTable) -> dict[str, Any]:
 
 def doubt_numbers(table: FeatureTable, confidence: dict[str, Any]) -> list[float]:
     """For each round the confidence from which on it is left out."""
-    claims = claimed(table, confidence)
-    right = table.won_right
-    return [calibration.doubt(claims[:, r], right[:, r], right[:, r + 1]) for r in range(right.shape[1] - 1)]
+    claims, right = claimed(table, confidence), table.won_right
+    optional = range(ALWAYS, right.shape[1] - 1)
+    fitted = [calibration.doubt(claims[:, r], right[:, r], right[:, r + 1]) for r in optional]
+    return [1.0] * ALWAYS + fitted
 
 
 def calibration_numbers(
@@ -68,21 +82,34 @@ def calibration_numbers(
 
 
 def scores(
-    table: FeatureTable, ridge: float, confidence: dict[str, Any], doubts: list[float]
+    table: FeatureTable,
+    ridge: float,
+    removed: list[str],
+    confidence: dict[str, Any],
+    doubts: list[float],
 ) -> dict[str, Any]:
     """How well the numbers do on kinds and families left out of the fit, beside all fitted to all."""
-    choices = table.choices()
-    by_family = _left_out(choices, family_folds(table), ridge)
+    choices, without = table.choices(), class_indices(removed)
+    every = np.ones(len(choices), np.bool_)
+    fitted = _winners(choices, every, fitted_weights(choices, ridge, without))
+    by_kind = _left_out(choices, kind_folds(table), ridge, without)
+    by_family = _left_out(choices, family_folds(table), ridge, without)
     families = sorted(set(table.families.tolist()))
     claims, right = held_out_claims(table, confidence, doubts)
     ended = last_rounds(claimed(table, confidence), doubts)
     chosen = table.won_right[np.arange(len(ended)), ended]
     return {
-        "right_fitted_to_all": _short(_success(choices, fitted_weights(choices, ridge))),
-        "right_kinds_left_out": _short(float(np.mean(_left_out(choices, kind_folds(table), ridge)))),
-        "right_families_left_out": _short(float(np.mean(by_family))),
+        **{
+            f"{measure}_{name}": _short(float(found[:, k].mean()))
+            for k, measure in enumerate(("right", "exact"))
+            for name, found in (
+                ("fitted_to_all", fitted),
+                ("kinds_left_out", by_kind),
+                ("families_left_out", by_family),
+            )
+        },
         "right_by_family_left_out": {
-            family: _short(float(np.mean(by_family[table.families == family]))) for family in families
+            family: _short(float(by_family[table.families == family, 0].mean())) for family in families
         },
         "snaps_right": _short(float(chosen.mean())),
         "auroc_families_left_out": _short(calibration.auroc(claims, right)),
@@ -93,9 +120,9 @@ def scores(
 
 def decision_features(table: FeatureTable, rounds: int, temperature: int) -> Array:
     """FEATURES (T, F) of the winners after so many rounds."""
-    counts = from_units(table.counts[:, rounds])
-    masses, values = table.masses[:, rounds, temperature], table.scores[:, rounds]
-    return features(masses.astype(np.float64), values.astype(np.float64), counts)
+    beliefs = table.beliefs[:, rounds, temperature].astype(np.float64)
+    values, counts = table.scores[:, rounds].astype(np.float64), from_units(table.counts[:, rounds])
+    return features(beliefs, values, counts)
 
 
 def claimed(table: FeatureTable, confidence: dict[str, Any]) -> Array:
@@ -127,8 +154,8 @@ def held_out_claims(
     claims = np.zeros(len(ended))
     for family in sorted(set(table.families)):
         out = table.families == family
-        rest = every[~out, 1:].reshape(-1, every.shape[2])
-        weights = calibration.logistic_weights(rest, table.won_exact[~out, 1:].ravel())
+        rest = every[~out, ALWAYS:].reshape(-1, every.shape[2])
+        weights = calibration.logistic_weights(rest, table.won_exact[~out, ALWAYS:].ravel())
         claims[out] = expit(spoken[out] @ weights)
     return claims, right
 
@@ -144,18 +171,21 @@ def family_folds(table: FeatureTable) -> list[NDArray[np.bool_]]:
     return [table.families == name for name in sorted(set(table.families.tolist()))]
 
 
-def _left_out(choices: list[Choice], folds: list[NDArray[np.bool_]], ridge: float) -> NDArray[np.bool_]:
-    """Whether the best candidate of each trial (T,) is right, fitted without its fold."""
-    right = np.zeros(len(choices), np.bool_)
+def _left_out(
+    choices: list[Choice], folds: list[Flags], ridge: float, removed: list[int]
+) -> NDArray[np.bool_]:
+    """Whether the best candidate of each trial is right, and exact, (T, 2), fitted without its fold."""
+    found = np.zeros((len(choices), 2), np.bool_)
     for out in folds:
-        weights = fitted_weights(where(choices, ~out), ridge)
-        right[out] = [one.right[np.argmax(one.features @ weights)] for one in where(choices, out)]
-    return right
+        weights = fitted_weights(where(choices, ~out), ridge, removed)
+        found[out] = _winners(choices, out, weights)
+    return found
 
 
-def _success(choices: list[Choice], weights: Array) -> float:
-    """Share of the trials whose best candidate is right."""
-    return float(np.mean([one.right[np.argmax(one.features @ weights)] for one in choices]))
+def _winners(choices: list[Choice], of: Flags, weights: Array) -> NDArray[np.bool_]:
+    """Whether the best candidate is right, and exact, (N, 2), in each trial that a mask (T,) keeps."""
+    kept = [(one, np.argmax(one.features @ weights)) for one in where(choices, of)]
+    return np.array([(one.right[best], one.exact[best]) for one, best in kept])
 
 
 def _short(value: float) -> float:

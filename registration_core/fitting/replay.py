@@ -26,8 +26,8 @@ class Decision:
     trial: int
     rounds: int
     """That were searched."""
-    masses: tuple[float, ...]
-    """Of its mode, for each of TEMPERATURES."""
+    beliefs: tuple[float, ...]
+    """Near it, for each of TEMPERATURES."""
     score: float
     counts: Array
     """(COUNT,)."""
@@ -61,11 +61,11 @@ def _decision(
     best, scores = winner(trial, candidates, judge)
     model = viewpoint_model(told_model(trial.kind, trial.variant))
     poses = trial.poses[:candidates]
-    masses = [_belief(poses, best, scores / t, model, confidence) for t in TEMPERATURES]
+    beliefs = [_belief(poses, best, scores / t, model, confidence) for t in TEMPERATURES]
     return Decision(
         trial=number,
         rounds=rounds,
-        masses=tuple(masses),
+        beliefs=tuple(beliefs),
         score=float(scores[best]),
         counts=trial.counts[best],
         right=bool(trial.right[best]),
@@ -76,5 +76,5 @@ def _decision(
 def _belief(
     poses: Array32, best: int, log_odds: Array, model: ViewpointModel, config: ConfidenceConfig
 ) -> float:
-    modes, masses = grouped(poses, best, log_odds, model, config)
-    return belief_in_first(poses[modes], masses, model)
+    modes = grouped(poses, best, log_odds, model, config)
+    return belief_in_first(modes, poses[modes.best], model)

@@ -20,9 +20,9 @@ from registration_core.fitting.trials import Trial
 Array = NDArray[np.float64]
 
 PATH = Path(__file__).with_name("table.npz")
-HARD = 20
-"""Candidates of a trial that are kept beside the start, its polishes and the best right one: those that would
-come nearest to winning."""
+HARD, EASY = 20, 10
+"""Candidates of a trial that are kept beside the start, its polishes and the best one that is wanted: those
+that would come nearest to winning, and some spread over the rest, or nothing would hold those back."""
 FIRST_RIDGE = 0.01
 """Of the ranking that finds those."""
 UNIT = 1.0 / 256.0
@@ -36,15 +36,17 @@ class FeatureTable:
     features: NDArray[np.int32]
     """(N, F), judged features in UNITs."""
     right: NDArray[np.bool_]
-    """(N,)."""
+    """(N,), as `Choice.right` has it."""
+    exact: NDArray[np.bool_]
+    """(N,), the same for `Choice.exact`."""
     lengths: NDArray[np.int32]
     """(T,), candidates of each trial."""
     families: NDArray[np.str_]
     """(T,)."""
     kinds: NDArray[np.str_]
     """(T,)."""
-    masses: NDArray[np.float32]
-    """(T, R, len(TEMPERATURES)), of the winner's mode after the polish and each round."""
+    beliefs: NDArray[np.float32]
+    """(T, R, len(TEMPERATURES)), near the winner after the polish and after each round."""
     scores: NDArray[np.float32]
     """(T, R), the winner's."""
     counts: NDArray[np.int32]
@@ -57,8 +59,10 @@ class FeatureTable:
     def choices(self) -> list[Choice]:
         """The trials, as a ranking is fitted to them."""
         ends = np.cumsum(self.lengths)
-        parts = zip(np.split(self.features, ends[:-1]), np.split(self.right, ends[:-1]), strict=True)
-        return [Choice(from_units(features), right) for features, right in parts]
+        parts = [
+            np.split(values, ends[:-1]) for values in (from_units(self.features), self.right, self.exact)
+        ]
+        return [Choice(*candidates) for candidates in zip(*parts, strict=True)]
 
     def hash(self) -> str:
         """Of the content, not of how it is packed."""
@@ -83,7 +87,7 @@ def read_table(path: Path = PATH) -> FeatureTable:
 
 def table_of(trials: Sequence[Trial]) -> FeatureTable:
     """The candidates that decide, found by a first ranking over all; decisions are still to be made."""
-    choices = [Choice(judged_features(one.counts, one.tails), one.right) for one in trials]
+    choices = [Choice(judged_features(one.counts, one.tails), one.right, one.exact) for one in trials]
     weights = fitted_weights(choices, FIRST_RIDGE)
     kept = [_deciding(choice, one.near, weights) for choice, one in zip(choices, trials, strict=True)]
     parts = [choice.features[rows] for choice, rows in zip(choices, kept, strict=True)]
@@ -91,10 +95,11 @@ def table_of(trials: Sequence[Trial]) -> FeatureTable:
     return FeatureTable(
         features=in_units(np.concatenate(parts)),
         right=np.concatenate([choice.right[rows] for choice, rows in zip(choices, kept, strict=True)]),
+        exact=np.concatenate([choice.exact[rows] for choice, rows in zip(choices, kept, strict=True)]),
         lengths=np.array([len(rows) for rows in kept], dtype=np.int32),
         families=np.array([one.family for one in trials]),
         kinds=np.array([one.kind for one in trials]),
-        masses=nothing.astype(np.float32),
+        beliefs=nothing.astype(np.float32),
         scores=nothing.astype(np.float32),
         counts=nothing.astype(np.int32),
         won_right=nothing.astype(np.bool_),
@@ -107,7 +112,7 @@ def with_decisions(table: FeatureTable, decisions: Sequence[Decision]) -> Featur
     shape = (len(table.lengths), -1)
     return replace(
         table,
-        masses=np.array([one.masses for one in decisions], np.float32).reshape(*shape, len(TEMPERATURES)),
+        beliefs=np.array([one.beliefs for one in decisions], np.float32).reshape(*shape, len(TEMPERATURES)),
         scores=np.array([one.score for one in decisions], np.float32).reshape(shape),
         counts=in_units(np.array([one.counts for one in decisions])).reshape(*shape, evidence.COUNT),
         won_right=np.array([one.right for one in decisions]).reshape(shape),
@@ -126,8 +131,6 @@ def from_units(values: NDArray[np.int32]) -> Array:
 
 
 def _deciding(choice: Choice, near: int, weights: Array) -> NDArray[np.intp]:
-    scores = choice.features @ weights
-    hard = np.argsort(-scores, kind="stable")[:HARD]
-    right = np.flatnonzero(choice.right)
-    best = right[[np.argmax(scores[right])]] if len(right) else right
-    return np.unique(np.concatenate([np.arange(1 + near), hard, best]))
+    order = np.argsort(-(choice.features @ weights), kind="stable")
+    kept = [order[:HARD], order[HARD :: max(1, (len(order) - HARD) // EASY)]]
+    return np.unique(np.concatenate([np.arange(1 + near), *kept, order[choice.wanted[order]][:1]]))

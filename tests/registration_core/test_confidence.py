@@ -11,7 +11,6 @@ from registration_core.confidence import (
     confidence,
     features,
     grouped,
-    mode_masses,
     modes_of,
     twins_of_first,
 )
@@ -24,15 +23,19 @@ CONFIG = SnapConfig().confidence
 
 
 def test_close_poses_are_one_mode() -> None:
+    apart = np.array([[0, 9, 1, 9], [9, 0, 9, 0], [1, 9, 0, 9], [9, 0, 9, 0]], np.float32) / 100
+    np.testing.assert_array_equal(modes_of(apart, 0.07), [0, 1, 0, 1])
+
+
+def test_mass_of_a_mode_is_that_of_its_best_and_what_is_near_it_counts_each_candidate() -> None:
     model = viewpoint_model(tool())
-    far = pose.exp([0.1, 0, 0, 0, 0, 0])
-    poses = to_rows(np.stack([np.eye(4), far, pose.exp([0.001, 0, 0, 0, 0, 0]), far]))
-    np.testing.assert_array_equal(modes_of(poses, model, 0.07), [0, 1, 0, 1])
-
-
-def test_mass_of_a_mode_is_that_of_its_best() -> None:
-    masses = mode_masses(np.array([1.0, 0.0, 0.9, 0.0]), np.array([0, 1, 0, 1]))
-    np.testing.assert_allclose(masses, [np.e / (np.e + 1), 1 / (np.e + 1)])
+    moved = [0.0, 0.2, 0.01, 0.06, 0.2]  # of the diameter; the fourth is of the winner's mode, but not near
+    poses = to_rows(np.stack([pose.exp([by * model.diameter, 0, 0, 0, 0, 0]) for by in moved]))
+    modes = grouped(poses, 0, np.array([1.0, 0.0, 0.9, 0.5, 0.0]), model, CONFIG)
+    np.testing.assert_array_equal(modes.best, [0, 1])
+    np.testing.assert_allclose(modes.masses, [np.e / (np.e + 1), 1 / (np.e + 1)])
+    belief = np.exp([1.0, 0.0, 0.9, 0.5, 0.0])
+    np.testing.assert_allclose(modes.near, np.array([belief[0] + belief[2], 2.0]) / belief.sum())
 
 
 def test_poses_that_put_the_same_surface_there_are_twins_whatever_symmetries_are_told() -> None:
@@ -50,17 +53,17 @@ def test_twins_stay_modes_of_their_own_but_the_belief_is_in_all_of_them() -> Non
     can = viewpoint_model(model_of(trimesh.creation.cylinder(radius=0.03, height=0.1)))
     turns = [pose.exp([0, 0, 0, 0, 0, angle]) for angle in (0.0, 1.0, 2.0, 3.0)]
     poses = to_rows(np.stack([*turns, pose.exp([0.1, 0, 0, 0, 0, 0])]))
-    found, masses = grouped(poses, 0, np.zeros(5), can, CONFIG)
-    np.testing.assert_allclose(masses, np.full(5, 0.2))
-    assert belief_in_first(poses[found], masses, can) == pytest.approx(0.8)
+    modes = grouped(poses, 0, np.zeros(5), can, CONFIG)
+    np.testing.assert_allclose(modes.masses, np.full(5, 0.2))
+    assert belief_in_first(modes, poses[modes.best], can) == pytest.approx(0.8)
 
 
 def test_what_has_no_mass_is_no_mode() -> None:
     model = viewpoint_model(tool())
     poses = to_rows(np.stack([np.eye(4), pose.exp([0.1, 0, 0, 0, 0, 0]), pose.exp([0.2, 0, 0, 0, 0, 0])]))
-    found, masses = grouped(poses, 0, np.array([50.0, 49.0, 0.0]), model, CONFIG)
-    np.testing.assert_array_equal(found, [0, 1])
-    assert masses.sum() == pytest.approx(1.0)
+    modes = grouped(poses, 0, np.array([50.0, 49.0, 0.0]), model, CONFIG)
+    np.testing.assert_array_equal(modes.best, [0, 1])
+    assert modes.masses.sum() == pytest.approx(1.0)
 
 
 def shares(match: float, seen_through: float) -> np.ndarray:
@@ -70,22 +73,23 @@ def shares(match: float, seen_through: float) -> np.ndarray:
 
 
 def test_features_are_what_they_are_called() -> None:
-    spoken = features(np.array([0.5]), np.array([3.0]), shares(0.75, 0.25)[None])[0]
+    spoken = features(np.array([0.25]), np.array([3.0]), shares(0.75, 0.25)[None])[0]
     found = dict(zip(FEATURES, spoken, strict=True))
-    assert found["mass"] == pytest.approx(0.0)
+    assert found["belief"] == pytest.approx(np.log(1 / 3))
     assert found["score"] == 3.0
     assert found["inner match"] == pytest.approx(0.75)
     assert found["shown"] == 1.0
 
 
-def test_confidence_rises_with_mass_score_and_match() -> None:
+def test_confidence_rises_with_belief_score_and_match() -> None:
     good, poor = shares(0.9, 0.0), shares(0.3, 0.6)
-    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.3, 8.0, good, CONFIG)
-    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 0.0, good, CONFIG)
-    assert confidence(0.9, 8.0, good, CONFIG) > confidence(0.9, 8.0, poor, CONFIG)
+    sure = confidence(0.9, 8.0, good, CONFIG)
+    assert sure > confidence(0.3, 8.0, good, CONFIG)
+    assert sure > confidence(0.9, 0.0, good, CONFIG)
+    assert sure > confidence(0.9, 8.0, poor, CONFIG)
     assert confidence(0.2, -8.0, poor, CONFIG) < 0.2
 
 
-@pytest.mark.parametrize("mass", [0.0, 0.5, 1.0])
-def test_confidence_of_no_pixels_at_all_is_a_probability(mass) -> None:
-    assert 0.0 <= confidence(mass, 0.0, np.zeros(COUNT), CONFIG) <= 1.0
+@pytest.mark.parametrize("belief", [0.0, 0.5, 1.0])
+def test_confidence_of_no_pixels_at_all_is_a_probability(belief) -> None:
+    assert 0.0 <= confidence(belief, 0.0, np.zeros(COUNT), CONFIG) <= 1.0
