@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -154,6 +155,10 @@ class ObjectModel:
         return self.symmetries.transforms(self.diameter)
 
 
+_reading = threading.Lock()
+"""One at a time: numpy parses a PLY file's types as Python, and CPython 3.11 fails where two threads do."""
+
+
 def read_mesh(content: bytes, file_type: str) -> trimesh.Trimesh:
     """The triangle mesh in a file's content, with its colours, vertices neither merged nor reordered.
 
@@ -161,7 +166,8 @@ def read_mesh(content: bytes, file_type: str) -> trimesh.Trimesh:
         ValueError: where trimesh cannot read it as one mesh.
     """
     try:
-        mesh = trimesh.load(io.BytesIO(content), file_type=file_type, force="mesh", process=False)
+        with _reading:
+            mesh = trimesh.load(io.BytesIO(content), file_type=file_type, force="mesh", process=False)
     except Exception as error:  # trimesh's readers raise whatever they meet
         raise ValueError(f"mesh cannot be read as {file_type}: {error}") from error
     if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
