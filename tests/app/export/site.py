@@ -14,6 +14,7 @@ from app.export.gate import Expected, expected_images
 from app.export.job import export_dataset
 from app.export.selection import select_dataset
 from app.storage import FileStore
+from app.symmetries import first_version
 from app.tables import Dataset, Frame, Object, Registration, Scene, Task, User
 from registration_core import Intrinsics, ObjectModel, Symmetries, pose
 from registration_core.bop_writer import write_color_png, write_depth_png, write_mesh
@@ -187,6 +188,7 @@ def add_object(session: Session, site: Site, obj_id: int) -> Object:
     )
     session.add(row)
     session.flush()
+    first_version(session, row)
     return row
 
 
