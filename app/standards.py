@@ -4,8 +4,6 @@ out.
 
 from functools import lru_cache
 
-from sqlalchemy import select
-
 from app.config import RISK
 from app.database import Database
 from app.labeling.assessment import Standard
@@ -30,26 +28,13 @@ class Standards:
     def of(self, dataset_id: int) -> Standard:
         """The standard of a dataset."""
         with self._database.read() as session:
-            risk = session.scalar(select(Dataset.risk).where(Dataset.id == dataset_id))
-            row = session.execute(
-                select(CalibrationRow.id, CalibrationRow.created_at).where(
-                    CalibrationRow.dataset_id == dataset_id, CalibrationRow.algorithm == ALGORITHM
-                )
-            ).one_or_none()
-        risk = self.risk if risk is None else risk
-        return _shipped(risk) if row is None else self._calibrated(risk, *row)
+            return self.of_row(session.get_one(Dataset, dataset_id))
 
     def of_row(self, row: Dataset, risk: float | None = None) -> Standard:
         """The same of a dataset that was read already; of another risk than its own where one is given."""
         risk = next(one for one in (risk, row.risk, self.risk) if one is not None)
         own = row.calibration
         return _shipped(risk) if own is None or own.algorithm != ALGORITHM else standard_of(own, risk)
-
-    @lru_cache(maxsize=256)  # noqa: B019 - there is one of it, as long as the application runs
-    def _calibrated(self, risk: float, calibration_id: int, _created_at: object) -> Standard:
-        with self._database.read() as session:
-            row = session.get_one(CalibrationRow, calibration_id)
-        return standard_of(row, risk)
 
 
 def standard_of(row: CalibrationRow, risk: float) -> Standard:

@@ -61,7 +61,11 @@ def test_a_dataset_has_its_own_risk_and_calibration_from_now_on(database, datase
         row = session.get_one(Dataset, dataset_id)
         assert standards.of_row(row) == standard
         assert standards.of_row(row, 0.2).risk == 0.2
-    assert standards.of(dataset_id + 1).risk == RISK
+    with database.write() as session:
+        other = Dataset(name="other tools")
+        session.add(other)
+    assert standards.of(other.id).risk == RISK
+    assert not standards.of(other.id).is_own
 
 
 def test_a_calibration_of_another_algorithm_rests(database, dataset_id) -> None:
