@@ -25,8 +25,14 @@ class Fitted:
     """For each round of a search, the confidence from which on it is left out."""
 
 
+NOTHING = Fitted(classes=(), match_share=0.0, prior=0.0, temperature=1.0, confidence=(), doubts=())
+"""Before anything was fitted: what is needed to search, but not to judge what is found."""
+
+
 def read_fitted(path: Path = PATH) -> Fitted:
-    """The fitted numbers in a file."""
+    """The fitted numbers in a file; `NOTHING` where there is none, so that they can be made from nothing."""
+    if not path.exists():
+        return NOTHING
     stored = json.loads(path.read_text(encoding="utf-8"))
     judge, confidence = stored["judge"], stored["confidence"]
     return Fitted(

@@ -64,14 +64,16 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
 def leads(candidates: Array32, counts: Array, config: SelectionConfig) -> Array:
     """What each of the poses (N, 3, 4), the start first, must score more than the one that stands, (N,).
 
-    Much where the start fits, by its counts (COUNT,), and the pose is another: the operator is probably right
-    then, and a small correction does no harm.
+    The more the start explains, by its counts (COUNT,), the more: one that claims nothing but what was not
+    measured is given up for anything better. Much is demanded where it fits and the pose is another: the
+    operator is probably right then, and a small correction does no harm.
     """
-    fits = match_shares(counts[None])[0] > config.fit_match
+    explained = match_shares(counts[None])[0] / config.fit_match
     moved = np.linalg.norm(candidates[:, :, 3] - candidates[0, :, 3], axis=1)
     turned = np.array([squared_angle(T, candidates[0]) for T in candidates])
     aside = (moved > config.aside_translation) | (turned > config.aside_rotation**2)
-    return np.where(fits & aside, config.lead_over_fit, config.lead)
+    lead = config.lead * min(1.0, explained)
+    return np.where(aside & (explained > 1.0), config.lead_over_fit, lead)
 
 
 def chosen(scores: Array, near: int, leads: Array) -> int:

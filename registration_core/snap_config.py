@@ -206,13 +206,14 @@ class RoundConfig:
 
 
 ROUNDS = ((0.4, 1.1), (0.5, 1.4), (0.8, 1.6))
-"""Share and widening of each; from which confidence on one is left out is fitted."""
+"""Share and widening of each; from which confidence on one is left out is fitted, and where it is not, none
+is."""
 ALWAYS = 1
 """Of them, the first so many are never left out: how sure a pose is cannot be told before rivals were looked
 for."""
 DEFAULT_ROUNDS = tuple(
     RoundConfig(share, widening, doubt)
-    for (share, widening), doubt in zip(ROUNDS, FITTED.doubts, strict=True)
+    for (share, widening), doubt in zip(ROUNDS, (*FITTED.doubts, *[1.0] * len(ROUNDS)), strict=False)
 )
 
 

@@ -132,7 +132,7 @@ def _conclusion(
 
 
 def _final(
-    run: SnapRun, iteration: int, modes: Array32, masses: Array, belief: float, converged: bool
+    run: SnapRun, iteration: int, modes: Array32, masses: Array, sure: float, converged: bool
 ) -> SnapStep:
     problem, model = run.problem, run.problem.model
     centred = from_rows(modes)
@@ -145,7 +145,7 @@ def _final(
     )
     estimate = Estimate(
         T_camera_object=poses[0],
-        confidence=belief,
+        confidence=sure,
         covariance=covariance(hessian, poses[0][:3, :3], model.radius, model.centre),
         hypotheses=_hypotheses(poses, masses),
         ambiguities=unknown,
@@ -155,7 +155,7 @@ def _final(
         converged=converged,
         seed=run.seed,
     )
-    return SnapStep(iteration, iteration, poses[0], belief, poses, estimate)
+    return SnapStep(iteration, iteration, poses[0], sure, poses, estimate)
 
 
 def _hypotheses(poses: Array, masses: Array) -> tuple[Hypothesis, ...]:

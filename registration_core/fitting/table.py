@@ -33,7 +33,7 @@ UNIT = 1.0 / 256.0
 class FeatureTable:
     """Candidates and decisions of all trials, one after the other, and what the trials are of."""
 
-    features: NDArray[np.int32]
+    features: NDArray[np.int16]
     """(N, F), judged features in UNITs."""
     right: NDArray[np.bool_]
     """(N,), as `Choice.right` has it."""
@@ -49,7 +49,7 @@ class FeatureTable:
     """(T, R, len(TEMPERATURES)), near the winner after the polish and after each round."""
     scores: NDArray[np.float32]
     """(T, R), the winner's."""
-    counts: NDArray[np.int32]
+    counts: NDArray[np.int16]
     """(T, R, COUNT), the winner's, in UNITs."""
     won_right: NDArray[np.bool_]
     """(T, R), whether its mean distance is small enough."""
@@ -101,7 +101,7 @@ def table_of(trials: Sequence[Trial]) -> FeatureTable:
         kinds=np.array([one.kind for one in trials]),
         beliefs=nothing.astype(np.float32),
         scores=nothing.astype(np.float32),
-        counts=nothing.astype(np.int32),
+        counts=nothing.astype(np.int16),
         won_right=nothing.astype(np.bool_),
         won_exact=nothing.astype(np.bool_),
     )
@@ -120,12 +120,12 @@ def with_decisions(table: FeatureTable, decisions: Sequence[Decision]) -> Featur
     )
 
 
-def in_units(values: Array) -> NDArray[np.int32]:
+def in_units(values: Array) -> NDArray[np.int16]:
     """As whole numbers of UNITs."""
-    return np.rint(values / UNIT).astype(np.int32)
+    return np.rint(values / UNIT).astype(np.int16)
 
 
-def from_units(values: NDArray[np.int32]) -> Array:
+def from_units(values: NDArray[np.int16]) -> Array:
     """Whole numbers of UNITs as what they stand for."""
     return values.astype(np.float64) * UNIT
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from registration_core import pose
 from registration_core.agreement import heavy_tails
 from registration_core.camera import project
+from registration_core.confidence import EXACT
 from registration_core.fitting.objects import KINDS, random_object
 from registration_core.fitting.scenes import SETTINGS, Picture, Seen, picture
 from registration_core.kernels import Array32, centred, from_rows, to_rows
@@ -42,8 +43,9 @@ BORDER = 20
 """Pixels from the image's border within which no object's middle lies."""
 IMPRECISE, UNDECLARED = 0.75, 0.5
 """Share of objects whose mesh is a little wrong, and of those whose symmetries nobody has told."""
-RIGHT, EXACT = 0.10, 0.05
-"""Mean and largest distance of surface points, shares of the diameter, up to which a pose is right, exact."""
+RIGHT = 0.10
+"""Mean distance of surface points, share of the diameter, up to which a pose is right; it is exact where the
+largest is below what the confidence is about."""
 TRUTH_TUKEY = (0.012, 0.004)
 """Widths of the robust kernel by which the truth is looked up in the measured depth, metres."""
 POINTS = 120

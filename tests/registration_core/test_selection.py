@@ -70,7 +70,18 @@ def test_more_lead_is_demanded_over_a_start_that_fits(scene) -> None:
     np.testing.assert_array_equal(
         leads(poses, fitting, config), [config.lead, config.lead, config.lead_over_fit]
     )
-    np.testing.assert_array_equal(leads(poses[::-1], astray, config), config.lead)
+    share = match_shares(astray[None])[0] / config.fit_match
+    assert 0.0 < share < 1.0
+    np.testing.assert_allclose(leads(poses[::-1], astray, config), config.lead * share)
+
+
+def test_a_start_that_claims_nothing_measured_is_left_for_anything_better(scene) -> None:
+    model, grid, truth = scene
+    config = SnapConfig().selection
+    poses = to_rows(np.stack([shifted(truth, z=-0.1), truth, truth]))
+    unseen = grid._replace(depth=np.zeros_like(grid.depth))
+    nothing = evidence(poses[:1], model, unseen, truth[2, 3])[0]
+    np.testing.assert_array_equal(leads(poses, nothing, config), 0.0)
 
 
 def test_the_winner_leads_by_what_is_demanded_of_it() -> None:
