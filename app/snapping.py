@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from concurrent.futures import Future as PlannedCall
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -85,6 +86,8 @@ class Snapper:
         self.topic = f"snap6d-{BOOT_ID}"
         """Where workers tell how far they are."""
         self._pending: dict[str, _Pending] = {}
+        self._left: dict[str, _Pending] = {}
+        """Jobs nobody waits for any more, whose workers have not been told yet."""
         self._lock = threading.Lock()
         self._cluster: LocalCluster | None = None
         # Whatever talks to the scheduler happens here, so that no operator waits for it.
@@ -150,19 +153,25 @@ class Snapper:
                 self._send(model_hash, content)
 
     def close(self) -> None:
-        """Stop the workers that were started here."""
+        """Let workers elsewhere go from whatever they are at, and stop those that were started here."""
         with self._lock:
+            self._left |= self._pending
             self._pending.clear()
         self._objects.close()
         self._calls.shutdown(wait=True, cancel_futures=True)
         if self._client.done() and not self._client.cancelled() and self._client.exception() is None:
+            with suppress(OSError):  # the scheduler may be gone already
+                self._stop(list(self._left))
             self._client.result().close()
         if self._cluster is not None:
             self._cluster.close()
 
     def _connect(self) -> Client:
-        # A snap that killed its worker once is not tried on the others.
-        dask.config.set({"distributed.scheduler.allowed-failures": 0})
+        # A snap that killed its worker once is not tried on the others; workers that were silent while this
+        # machine slept are not taken for dead when it wakes up.
+        dask.config.set(
+            {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None}
+        )
         if not self._scheduler_address:
             self._cluster = LocalCluster(
                 n_workers=self._workers,
@@ -196,7 +205,9 @@ class Snapper:
         )
         pending.future = future
         if self._find(snap_id) is None:  # cancelled in this moment
-            self._stop(pending)
+            with self._lock:
+                self._left[snap_id] = pending
+            self._stop([snap_id])
             return
         future.add_done_callback(lambda done: self._on_done(snap_id, done))
 
@@ -259,15 +270,23 @@ class Snapper:
     def _cancel(self, snap_id: str) -> None:
         with self._lock:
             pending = self._pending.pop(snap_id, None)
+            if pending is not None:
+                self._left[snap_id] = pending
         if pending is not None:
-            self._calls.submit(self._stop, pending)
+            self._calls.submit(self._stop, [snap_id])
 
-    def _stop(self, pending: _Pending) -> None:
+    def _stop(self, snap_ids: Sequence[str]) -> None:
+        """Tell the workers of jobs that were left, once."""
         client = self._client.result()
-        if pending.future is None:
-            return
-        client.run(worker.cancel, pending.job.snap_id)
-        pending.future.cancel()
+        with self._lock:
+            left = {one: self._left.pop(one) for one in snap_ids if one in self._left}
+        submitted = {
+            snap_id: pending.future for snap_id, pending in left.items() if pending.future is not None
+        }
+        if submitted:
+            client.run(worker.cancel, list(submitted), on_error="ignore")
+        for future in submitted.values():
+            future.cancel()
 
     def _submit_build(self, model: ObjectModel, priority: int) -> Future:
         return self._client.result().submit(worker.build, model, pure=False, priority=priority)

@@ -196,9 +196,9 @@ def lacking(model_hashes: Sequence[str]) -> set[str]:
     return {model_hash for model_hash in model_hashes if model_hash not in _objects}
 
 
-def cancel(snap_id: str) -> None:
-    """Stop a job at its next step, if it runs here or comes here later."""
-    _cancelled.append(snap_id)
+def cancel(snap_ids: Sequence[str]) -> None:
+    """Stop jobs at their next step, if they run here or come here later."""
+    _cancelled.extend(snap_ids)
 
 
 def dask_setup(dask_worker: Any) -> None:

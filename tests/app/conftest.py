@@ -56,7 +56,7 @@ def demo_copy(demo: Path, tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def cluster() -> Iterator[str]:
     """Address of a scheduler with two workers."""
-    dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None})
     with LocalCluster(
         n_workers=2,
         threads_per_worker=1,

@@ -9,6 +9,7 @@ from pathlib import Path
 import dask
 import numpy as np
 import pytest
+from distributed import Client, Scheduler, Worker
 
 from app.snapping import DIED, UNREACHABLE, SnapError, Snapper
 from app.storage import PreparedStore
@@ -230,6 +231,18 @@ def test_a_snap_that_waits_for_its_object_says_so(snapper, model):
     assert isinstance(result_of(outcome), JobResult) and built.done()
 
 
+def test_workers_outlast_a_sleep_of_the_machine(snapper):
+    async def wake_up(dask_scheduler: Scheduler) -> None:
+        for state in dask_scheduler.workers.values():
+            state.last_seen -= 3600.0
+        if (watch := dask_scheduler.periodic_callbacks.get("worker-ttl")) is not None:
+            await watch.callback()
+
+    before = pids(snapper)
+    snapper._client.result().run_on_scheduler(wake_up)
+    assert pids(snapper) == before and len(before) == 2
+
+
 def test_an_object_that_no_worker_knows_is_sent_along(snapper):
     unknown = new_model()
     assert knowing(snapper, unknown.content_hash) == 0
@@ -300,6 +313,17 @@ def test_workers_of_a_cluster_get_what_one_of_them_built(cluster, tmp_path):
         assert knowing(elsewhere, model.content_hash) == 2 and knowing(elsewhere, other.content_hash) == 0
         elsewhere.prepare(other)
         wait_until(lambda: knowing(elsewhere, other.content_hash) == 2, "the workers to be prepared")
+
+
+def test_workers_of_a_cluster_do_not_go_on_for_who_has_closed(cluster, model, tmp_path):
+    def at_work(dask_worker: Worker) -> int:
+        return len(dask_worker.active_threads)
+
+    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
+        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic, SLOW), model)
+        assert outcome.moved.wait(LONGEST)
+    with Client(cluster, set_as_default=False) as onlooker:
+        wait_until(lambda: sum(onlooker.run(at_work).values()) == 0, "the worker to stop", seconds=5.0)
 
 
 def test_without_a_scheduler_a_snap_says_so(model, tmp_path):

@@ -91,7 +91,7 @@ def test_a_search_finds_what_the_library_finds(client, addresses, model, content
 
 def test_a_search_cancelled_before_it_comes_does_not_run(client, addresses, model, content):
     job = SearchJob("left", "", model.content_hash, SnapConfig(), DEPTH, CAMERA, 3, None)
-    client.run(worker.cancel, job.snap_id)
+    client.run(worker.cancel, [job.snap_id])
     with pytest.raises(SnapCancelledError):
         run(client, addresses[0], worker.run_job, job, content)
 
@@ -133,7 +133,7 @@ def test_progress_is_told_by_snap(client, addresses, model, content):
 
 def test_a_snap_cancelled_before_it_comes_does_not_run(client, addresses, model, content):
     job = new_job(model)
-    client.run(worker.cancel, job.snap_id)
+    client.run(worker.cancel, [job.snap_id])
     with pytest.raises(SnapCancelledError):
         run(client, addresses[0], worker.run_job, job, content)
 

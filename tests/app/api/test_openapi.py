@@ -72,9 +72,13 @@ def known_ids(explorer: httpx.Client, path: str) -> dict[str, int | str]:
     return ids
 
 
+RANDOM_ELSEWHERE = "ignore:Do not use the `random`:hypothesis.errors.HypothesisDeprecationWarning"
+"""The server's threads may draw from `random` while a strategy does, which Hypothesis takes for its doing."""
+
 EXPLORED = [operation for operation in OPERATIONS if not operation[0].endswith(ENDLESS)]
 
 
+@pytest.mark.filterwarnings(RANDOM_ELSEWHERE)
 @pytest.mark.parametrize(("path", "method"), EXPLORED, ids=names(EXPLORED))
 def test_calls_get_the_answers_that_are_promised(
     server: LiveServer, explorer: httpx.Client, path: str, method: str
