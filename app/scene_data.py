@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from app.outline_mesh import thinned
 from app.storage import FileStore
 from app.tables import Frame, Object
-from registration_core import Intrinsics, ObjectModel, Symmetries, pose
+from registration_core import Intrinsics, ObjectModel, Symmetries, color_is_aligned, pose
 from registration_core.bop import read_color, read_depth
 from registration_core.camera import depth_to_points
 from registration_core.object_model import ContinuousSymmetry
@@ -40,6 +40,7 @@ class SceneData:
         self._model = lru_cache(KEPT_MODELS)(self._load_model)
         self._thinned = lru_cache(KEPT_MODELS)(thinned)
         self._depth = lru_cache(KEPT_FRAMES)(self._load_depth)
+        self._aligned_color = lru_cache(KEPT_FRAMES)(self._load_aligned_color)
 
     def model(self, item: Object) -> ObjectModel:
         """The object's mesh, in metres."""
@@ -56,6 +57,12 @@ class SceneData:
     def color(self, frame: Frame) -> NDArray[np.uint8] | None:
         """The frame's colour image (H, W, 3), where it has one."""
         return read_color(self._files.path(frame.color_hash)) if frame.color_hash else None
+
+    def aligned_color(self, frame: Frame) -> NDArray[np.uint8] | None:
+        """The same where the images show that it lies on the depth, pixel by pixel; not to be written to."""
+        if not frame.color_hash:
+            return None
+        return self._aligned_color(frame.color_hash, frame.depth_hash, frame.depth_scale)
 
     def cloud(self, frame: Frame) -> PointCloud:
         """The frame's measured points in the world, thinned out evenly where there are too many."""
@@ -79,6 +86,15 @@ class SceneData:
         depth = read_depth(self._files.path(digest), depth_scale)
         depth.setflags(write=False)
         return depth
+
+    def _load_aligned_color(
+        self, digest: str, depth_digest: str, depth_scale: float
+    ) -> NDArray[np.uint8] | None:
+        color, depth = read_color(self._files.path(digest)), self._depth(depth_digest, depth_scale)
+        if color.shape[:2] != depth.shape or not color_is_aligned(color, depth):
+            return None
+        color.setflags(write=False)
+        return color
 
 
 def camera_of(frame: Frame) -> Intrinsics:

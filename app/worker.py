@@ -94,6 +94,8 @@ class JobView:
     """(4, 4), where it stands, in the camera axes of the frame that is shown."""
     explained: NDArray[np.bool_] | None
     """(H, W), the pixels of other objects whose pose is known; None where there are none."""
+    color: NDArray[np.uint8] | None
+    """(H, W, 3), aligned with the depth; None where there is none."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,7 @@ class SnapJob(Job[JobResult]):
             self.start_spread,
             [view.explained for view in self.views],
             self.used,
+            [view.color for view in self.views],
         ):
             tell(step.iteration / max(1, step.iterations))
             estimate = step.estimate

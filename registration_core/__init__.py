@@ -4,6 +4,7 @@ from registration_core.acceptance import NEVER, Calibration, acceptance, calibra
 from registration_core.algorithm import ALGORITHM
 from registration_core.camera import Intrinsics
 from registration_core.certificates import Certificates, Check
+from registration_core.color_edges import color_is_aligned
 from registration_core.compilation import warm_up
 from registration_core.correspondence import Correspondence, pose_from_correspondences
 from registration_core.estimate import Ambiguity, Estimate, Hypothesis, SnapStep, WorldEstimate
@@ -43,6 +44,7 @@ __all__ = [
     "axes_of",
     "calibration_of",
     "check_axes",
+    "color_is_aligned",
     "explained_pixels",
     "find_symmetries",
     "pose_from_correspondences",

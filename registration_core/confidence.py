@@ -15,10 +15,14 @@ from registration_core.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]
 
-FEATURES = ("intercept", "belief", "score", "match", "inner match", "shown", "contrast")
+FEATURES = (
+    *("intercept", "belief", "score", "match", "inner match", "shown"),
+    *("contrast", "color", "color change"),
+)
 """What speaks for a winner: 1, the logit of the share of the belief that lies within EXACT of it, its score
 in log-odds, the share of its claim that was measured where it is claimed, the same away from rims, the share
-that is not hidden, and the share of its outline where the surface ends.
+that is not hidden, the share of its outline where the surface ends, 1 where its outline was seen in colour,
+and the share of that where the colour changes.
 """
 EXACT = 0.05
 """MSSD below which a pose is right, share of the diameter."""
@@ -30,6 +34,8 @@ LEAST_INNER = 0.1
 """Share of the mean silhouette: no smaller an inner part is trusted in its match."""
 LEAST_RING = 0.1
 """The same for what was seen just outside the outline."""
+LEAST_COLORED = 0.02
+"""The same for what was seen of the outline's colours: less says nothing."""
 LIKE_WEIGHT = 0.02
 """Modes with less than this share of the winner's mass are not compared with it."""
 SAME_SURFACE = 0.03
@@ -130,6 +136,9 @@ def features(beliefs: Array, scores: Array, counts: Array) -> Array:
     visible = inner.sum(axis=1) - inner[:, list(evidence.HIDDEN)].sum(axis=1)
     rings = counts[:, evidence.RING : evidence.BELOW].reshape(len(counts), -1, evidence.RING_BINS).sum(axis=1)
     ends = rings[:, list(evidence.ENDS)].sum(axis=1)
+    changes = counts[:, evidence.COLOR_CHANGES]
+    outline = changes + counts[:, evidence.COLOR_STEADY]
+    colored = outline >= LEAST_COLORED
     return np.stack(
         [
             np.ones(len(counts)),
@@ -139,6 +148,8 @@ def features(beliefs: Array, scores: Array, counts: Array) -> Array:
             matched / np.maximum(visible, LEAST_INNER),
             shown_shares(counts),
             ends / np.maximum(rings.sum(axis=1), LEAST_RING),
+            colored,
+            np.where(colored, changes / np.maximum(outline, LEAST_COLORED), 0.0),
         ],
         axis=1,
     )

@@ -7,6 +7,9 @@ rims. A pixel just outside, or a little farther out, tells whether the surface e
 Counts are divided by one area for all candidates, so that a background which does not depend on the pose
 cancels and candidates of different outlines are compared on the union of their pixels.
 
+Where there is a colour image, the edges of the outline beside pixels that are not hidden are counted as well:
+whether the colour changes there.
+
 A pixel of a known object says nothing for or against what it hides, and never that a surface goes on; only a
 surface claimed clearly before it was seen through.
 """
@@ -53,12 +56,16 @@ ENDS = (4, 5, OFF_RING + 3)
 """The bins within a ring of what was measured clearly behind the rim: the surface ends there."""
 BELOW = RING + len(OUT) * RING_BINS
 """Share of the object's vertices that lie clearly below the supporting plane, where nothing can be."""
-COUNT = BELOW + 1
+COLOR_STEADY, COLOR_CHANGES = BELOW + 1, BELOW + 2
+"""Edges of pixels of the visible outline where the colour does not change, and where it does."""
+COUNT = COLOR_CHANGES + 1
 
 STEP = 0.010
 """Metres of depth between pixels of a claim, for each pixel that they are apart: beyond it they are rim."""
 AGREES = 0.010
 """A pixel outside counts only beside a rim that was measured where it is claimed, within this, metres."""
+IN_FRONT = -0.012
+"""Metres behind a claimed surface, a negative number, below which something else was measured in front."""
 SEEN_THROUGH = 0.006
 """Metres behind a claimed surface at which a known object says that the surface is not there."""
 GOES_ON = (-0.006, 0.040)
@@ -79,7 +86,7 @@ def class_names() -> tuple[str, ...]:
     outside = _bin_names(BEYOND, "off plane") + _bin_names(BEYOND_ON_PLANE, "on plane") + ["unmeasured"]
     parts = [f"{part}, {name}" for part in ("inner", "rim") for name in inside]
     rings = [f"{out} pixels out, {name}" for out in OUT for name in outside]
-    return (*parts, *rings, "below the plane")
+    return (*parts, *rings, "below the plane", "outline, color steady", "outline, color changes")
 
 
 def _bin_names(limits: Array, where: str) -> list[str]:
@@ -89,8 +96,8 @@ def _bin_names(limits: Array, where: str) -> list[str]:
 
 
 def evidence(poses: Array32, model: ViewpointModel, grid: Grid, distance: float) -> Array:
-    """Counts (N, COUNT) for poses (N, 3, 4), as shares of the mean silhouette area at `distance` [m]; the
-    last is a share of vertices.
+    """Counts (N, COUNT) for poses (N, 3, 4), as shares of the mean silhouette area at `distance` [m]; that
+    of BELOW is a share of vertices.
     """
     counts = np.zeros((len(poses), COUNT))
     _count(
@@ -112,7 +119,7 @@ def below(poses: Array32, vertices: Array32, plane: Array) -> Array:
 
 @njit(**EXACT)
 def _count(poses, vertices, faces, both_sides, grid, sharpness, counts):
-    depth, on_plane, known = grid.depth, grid.on_plane, grid.known
+    depth, on_plane, known, changes = grid.depth, grid.on_plane, grid.known, grid.changes
     height, width = depth.shape
     fx, fy, cx, cy = float(grid.fx), float(grid.fy), float(grid.cx), float(grid.cy)
     inverse_depth = np.zeros((height, width))
@@ -142,6 +149,8 @@ def _count(poses, vertices, faces, both_sides, grid, sharpness, counts):
         others = known[first_row:end_row, first_column:end_column]
         _count_inside(crop, seen, plane, others, sharpness, count)
         _count_outside(crop, seen, plane, others, sharpness, count)
+        if changes.size > 0:
+            _count_colors(crop, seen, others, changes, height - 2, first_row, first_column, sharpness, count)
 
 
 @njit(**EXACT)
@@ -238,3 +247,41 @@ def _ring_bin(seen, behind, on_plane, known):
     else:
         kind = _bin(behind, BEYOND)
     return kind
+
+
+@njit(**EXACT)
+def _count_colors(crop, depth, known, changes, rows, first_row, first_column, sharpness, count):
+    """Count the edges of the visible outline by whether the colour changes across them, in the image that the
+    grid's `rows` without its border were reduced from.
+    """
+    block = changes.shape[0] // rows
+    for r in range(crop.shape[0]):
+        for c in range(crop.shape[1]):
+            here = crop[r, c]
+            hidden = depth[r, c] > 0.0 and sharpness * (depth[r, c] - 1.0 / here) < IN_FRONT
+            if here == 0.0 or hidden or known[r, c]:
+                continue
+            for down, right in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+                i, j = r + down, c + right
+                if 0 <= i < crop.shape[0] and 0 <= j < crop.shape[1] and crop[i, j] == 0.0:
+                    row, column = (first_row + r - 1) * block, (first_column + c - 1) * block
+                    changed = _changes_across(changes, row, column, block, down, right)
+                    count[COLOR_CHANGES if changed else COLOR_STEADY] += 1
+
+
+@njit(**EXACT, inline="always")
+def _changes_across(changes, row, column, block, down, right):
+    """Whether the colour changes on the line from the block of pixels at (row, column) to the next one, as
+    far from the edge between them as the outline may be off: half a block, or a pixel.
+    """
+    reach = max(1, block // 2)
+    i, j = row + block // 2, column + block // 2
+    if down != 0:
+        i = (row + block if down > 0 else row) - reach
+    else:
+        j = (column + block if right > 0 else column) - reach
+    for _ in range(2 * reach):
+        if 0 <= i < changes.shape[0] and 0 <= j < changes.shape[1] and changes[i, j]:
+            return True
+        i, j = i + abs(down), j + abs(right)
+    return False

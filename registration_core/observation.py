@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from registration_core.camera import Intrinsics
+from registration_core.color_edges import color_changes
 from registration_core.kernels import FAST, Array32, f4, random_state, uniform
 from registration_core.snap_config import ObservationConfig
 from registration_core.viewpoint_model import ViewpointModel
@@ -43,6 +44,9 @@ class Grid(NamedTuple):
     plane: NDArray[np.float64]
     """(4,), unit normal n and offset d of the supporting plane: `n p + d` is how far a point lies above it,
     on the camera's side, metres; all 0 where there is none."""
+    changes: NDArray[np.bool_]
+    """((H - 2) b, (W - 2) b), pixels of the image where the colour changes, as `color_changes` has it, b of
+    them along an edge of one of the grid's; (0, 0) without a colour image."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +105,16 @@ def observe(
     config: ObservationConfig,
     rng: np.random.Generator,
     explained: NDArray[np.bool_] | None = None,
+    color: NDArray[np.uint8] | None = None,
 ) -> Observation:
     """Read the depth image (H, W), metres, around an object expected at `centre` (3,), camera axes.
 
     Args:
         explained: (H, W), the pixels of known objects; None where there are none.
+        color: (H, W, 3), aligned with the depth; None where there is none.
     """
     bounds = window(camera, centre, model.radius, config.reach)
-    return observe_region(depth, camera, bounds, float(centre[2]), model, config, rng, explained)
+    return observe_region(depth, camera, bounds, float(centre[2]), model, config, rng, explained, color)
 
 
 def observe_region(
@@ -120,6 +126,7 @@ def observe_region(
     config: ObservationConfig,
     rng: np.random.Generator,
     explained: NDArray[np.bool_] | None = None,
+    color: NDArray[np.uint8] | None = None,
 ) -> Observation:
     """Read the part (left, top, right, bottom) of the depth image (H, W), metres, in which an object is about
     `distance` [m] off.
@@ -140,7 +147,11 @@ def observe_region(
     weight, known = np.ones_like(reduced), np.zeros(reduced.shape, np.bool_)
     if explained is not None:
         known[1:-1, 1:-1] = _reduced_mask(explained[top:bottom, left:right], block)
-    grid = Grid(reduced, normals, weight, fx, fy, cx, cy, known, np.zeros_like(known), np.zeros(4))
+    changes = np.zeros((0, 0), np.bool_)
+    if color is not None:
+        changes = color_changes(color[top : top + rows * block, left : left + columns * block])
+    on_plane = np.zeros_like(known)
+    grid = Grid(reduced, normals, weight, fx, fy, cx, cy, known, on_plane, np.zeros(4), changes)
     unknown = grid._replace(depth=np.where(known, f4(0), reduced))
     plane = _find_plane(unknown, config.plane_trials, f4(config.plane_tolerance), random_state(rng))
     silhouette = model.mean_area * float(fx) * float(fy) / max(distance, NEAREST) ** 2

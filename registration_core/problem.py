@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from registration_core import pose
 from registration_core.agreement import Prior
 from registration_core.camera import Intrinsics
+from registration_core.color_edges import checked_color
 from registration_core.kernels import Array32, centred, f4, from_rows, to_rows, uncentred
 from registration_core.observation import window
 from registration_core.snap_config import SnapConfig, SpreadConfig
@@ -51,6 +52,8 @@ class Problem:
     config: SnapConfig
     explained: NDArray[np.bool_] | None = None
     """(H, W), the pixels of known objects; None where there are none."""
+    color: NDArray[np.uint8] | None = None
+    """(H, W, 3), aligned with the depth; None where there is none."""
 
     @property
     def spread(self) -> tuple[float, float]:
@@ -75,6 +78,7 @@ def checked_problem(
     config: SnapConfig,
     start_spread: tuple[float, float] | None,
     explained: ArrayLike | None = None,
+    color: ArrayLike | None = None,
 ) -> Problem:
     """The inputs of `snap` as a Problem.
 
@@ -88,7 +92,8 @@ def checked_problem(
     check_in_view(viewpoints, camera, start)
     prior, search = _priors(start, config.spread, start_spread)
     mask = None if explained is None else checked_mask(explained, camera)
-    return Problem(viewpoints, image, camera, T, start, prior, search, config, mask)
+    colors = None if color is None else checked_color(color, camera)
+    return Problem(viewpoints, image, camera, T, start, prior, search, config, mask, colors)
 
 
 def region_of_interest(

@@ -136,7 +136,7 @@ def search_of(problem: Problem, rng: np.random.Generator) -> Search:
     """The search for what a problem asks for, its depth image read around the start."""
     observation = observe(
         problem.depth, problem.camera, problem.start[:3, 3], problem.model, problem.config.observation, rng,
-        problem.explained,
+        problem.explained, problem.color,
     )  # fmt: skip
     return Search(problem, observation, surface_of(problem.model), rng)
 

@@ -36,6 +36,7 @@ def snap(
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
     explained: ArrayLike | None = None,
+    color: ArrayLike | None = None,
 ) -> Estimate:
     """Refine the operator's pose of an object against a depth image.
 
@@ -48,11 +49,15 @@ def snap(
         unknown.
         explained: (H, W) booleans, pixels that objects of known pose account for (`explained_pixels`): they
         attract nothing, and hide what lies behind them.
+        color: (H, W, 3) bytes, pixel by pixel of the same place and time as the depth, which
+        `color_is_aligned` may tell; None where there is none.
 
     Raises:
         ValueError: naming the argument that is wrong, and how.
     """
-    for step in snap_steps(model, depth, camera, T_camera_object, config, rng, start_spread, explained):
+    for step in snap_steps(
+        model, depth, camera, T_camera_object, config, rng, start_spread, explained, color
+    ):
         if step.estimate is not None:
             return step.estimate
     raise AssertionError("the last step carries the estimate")
@@ -67,6 +72,7 @@ def snap_steps(
     rng: np.random.Generator | None = None,
     start_spread: tuple[float, float] | None = None,
     explained: ArrayLike | None = None,
+    color: ArrayLike | None = None,
 ) -> Iterator[SnapStep]:
     """`snap` step by step, so that a caller can show progress and stop early; the last step has the estimate.
 
@@ -74,7 +80,7 @@ def snap_steps(
     """
     started = time.perf_counter()
     config = SnapConfig() if config is None else config
-    problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread, explained)
+    problem = checked_problem(model, depth, camera, T_camera_object, config, start_spread, explained, color)
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
     return steps_of(SnapRun((Sighting(search_of(problem, rng), np.eye(4)),), seed, started))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import trimesh
@@ -18,6 +19,7 @@ from registration_core.tabletop import Layout, Placed, cameras_around, place
 
 Array = NDArray[np.float64]
 DepthImage = NDArray[np.float32]
+Pixel = TypeVar("Pixel", np.float32, np.uint8)
 
 CAMERA = Intrinsics(width=640, height=480, fx=570.0, fy=570.0, cx=319.5, cy=239.5)
 """A PrimeSense's camera."""
@@ -156,7 +158,12 @@ class Silhouette:
         shown = int((np.isfinite(part) & (part <= image)).sum())
         return shown / max(1, int(np.isfinite(self.depth).sum()))
 
-    def _overlap(self, image: DepthImage) -> tuple[DepthImage, DepthImage]:
+    def label_in(self, labels: NDArray[np.uint8], nearest: DepthImage, label: int) -> None:
+        """Write `label` into `labels` (H, W) where this is the nearest surface."""
+        image, part = self._overlap(nearest)
+        self._overlap(labels)[0][np.isfinite(part) & (part <= image)] = label
+
+    def _overlap(self, image: NDArray[Pixel]) -> tuple[NDArray[Pixel], DepthImage]:
         """The parts of an image (H, W) and of this depth that lie on each other."""
         height, width = self.depth.shape
         rows, columns = _within(self.top, height, image.shape[0]), _within(self.left, width, image.shape[1])

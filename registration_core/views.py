@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from registration_core import pose
 from registration_core.camera import Intrinsics
+from registration_core.color_edges import checked_color
 from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
 from registration_core.problem import OutOfViewError, Problem, checked_depth, checked_mask, checked_problem
 from registration_core.search import search_of
@@ -34,6 +35,7 @@ def snap_views(
     start_spread: tuple[float, float] | None = None,
     explained: Sequence[ArrayLike | None] | None = None,
     used: int | None = None,
+    colors: Sequence[ArrayLike | None] | None = None,
 ) -> WorldEstimate:
     """Refine the operator's pose of an object against several depth images of a scene that stands still.
 
@@ -48,13 +50,16 @@ def snap_views(
         rng: as for `snap`.
         start_spread: as for `snap`.
         explained: as for `snap`, one for each view, None for a view without.
+        colors: as `color` for `snap`, one for each view, None for a view without.
         used: so many of the views, the first ones, are used; the others are only asked at the end whether
             they agree: `Certificates.unused`. All are used where it is None.
 
     Raises:
         ValueError: naming the argument that is wrong, and how.
     """
-    for step in snap_views_steps(model, views, T_world_object, config, rng, start_spread, explained, used):
+    for step in snap_views_steps(
+        model, views, T_world_object, config, rng, start_spread, explained, used, colors
+    ):
         if isinstance(step.estimate, WorldEstimate):
             return step.estimate
     raise AssertionError("the last step carries the estimate")
@@ -69,6 +74,7 @@ def snap_views_steps(
     start_spread: tuple[float, float] | None = None,
     explained: Sequence[ArrayLike | None] | None = None,
     used: int | None = None,
+    colors: Sequence[ArrayLike | None] | None = None,
 ) -> Iterator[SnapStep]:
     """`snap_views` step by step, as `snap_steps`; the world takes the place of the camera in every step.
 
@@ -83,15 +89,10 @@ def snap_views_steps(
         raise ValueError(f"used must be from 1 to the number of views, {len(views)}; it is {used!r}")
     if config.method != "viewpoint" and used > 1:
         raise ValueError("config.method must be 'viewpoint': the particle filter uses one view only")
-    masks = [None] * len(views) if explained is None else explained
-    if len(masks) != len(views):
-        raise ValueError(
-            f"explained must hold a mask or None for each of the views, {len(views)}; it has {len(masks)}"
-        )
+    masks = _one_a_view(explained, len(views), "explained must hold a mask")
+    images = _one_a_view(colors, len(views), "colors must hold an image")
     T_start = pose.checked(T_world_object, "T_world_object")
-    checked = [
-        _checked(number, view, mask) for number, (view, mask) in enumerate(zip(views, masks, strict=True))
-    ]
+    checked = [_checked(number, *view) for number, view in enumerate(zip(views, masks, images, strict=True))]
     problems = _problems(model, checked[:used], T_start, config, start_spread)
     seed = seed_of(rng)
     rng = np.random.default_rng(seed)
@@ -101,7 +102,7 @@ def snap_views_steps(
     sightings = [Sighting(search, pose.inverse(T) @ T_world_first) for search, T in searches]
     witnesses = [
         Witness(depth, camera, pose.inverse(T) @ T_world_first, mask)
-        for depth, camera, T, mask in checked[used:]
+        for depth, camera, T, mask, _ in checked[used:]
     ]
     run = SnapRun(tuple(sightings), seed, started, tuple(witnesses))
     return (_in_world(step, T_world_first, T_start, run.problem.T_camera_object) for step in steps_of(run))
@@ -112,14 +113,26 @@ class _CheckedView(NamedTuple):
     camera: Intrinsics
     T_world_camera: Array
     explained: NDArray[np.bool_] | None
+    color: NDArray[np.uint8] | None
 
 
-def _checked(number: int, view: View, explained: ArrayLike | None) -> _CheckedView:
+def _one_a_view(
+    images: Sequence[ArrayLike | None] | None, views: int, what: str
+) -> Sequence[ArrayLike | None]:
+    if images is None:
+        return [None] * views
+    if len(images) != views:
+        raise ValueError(f"{what} or None for each of the views, {views}; it has {len(images)}")
+    return images
+
+
+def _checked(number: int, view: View, explained: ArrayLike | None, color: ArrayLike | None) -> _CheckedView:
     depth, camera, T_world_camera = view
     try:
         image = checked_depth(depth, camera)
         mask = None if explained is None else checked_mask(explained, camera)
-        return _CheckedView(image, camera, pose.checked(T_world_camera, "T_world_camera"), mask)
+        seen = None if color is None else checked_color(color, camera)
+        return _CheckedView(image, camera, pose.checked(T_world_camera, "T_world_camera"), mask, seen)
     except ValueError as error:
         raise ValueError(f"views[{number}]: {error}") from error
 
@@ -133,10 +146,10 @@ def _problems(
 ) -> list[tuple[Problem, Array]]:
     """What is to be done in each view that may show the object, and its `T_world_camera` (4, 4)."""
     found = []
-    for depth, camera, T_world_camera, mask in views:
+    for depth, camera, T_world_camera, mask, color in views:
         T = pose.inverse(T_world_camera) @ T_world_object
         with suppress(OutOfViewError):
-            problem = checked_problem(model, depth, camera, T, config, start_spread, mask)
+            problem = checked_problem(model, depth, camera, T, config, start_spread, mask, color)
             found.append((problem, T_world_camera))
     if not found:
         raise ValueError("T_world_object puts the object wholly outside the image of every view")

@@ -27,7 +27,7 @@ class Dispatch:
 
     Args:
         snapper: Runs jobs.
-        data: Where depth comes from.
+        data: Where depth and colour come from.
         frames: The scene's frames, by id.
         sought: What is looked for.
         neighbours: Tells which pixels other objects explain.
@@ -122,7 +122,7 @@ class Dispatch:
         explained = self._neighbours.explained(frame, order.known)
         camera, T_world_camera = camera_of(frame), np.array(frame.T_world_camera)
         T_camera_object = pose.inverse(T_world_camera) @ order.T_world_object
-        whole = self._data.depth(frame)
+        whole, color = self._data.depth(frame), self._data.aligned_color(frame)
         try:
             left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
         except ValueError as error:
@@ -135,6 +135,7 @@ class Dispatch:
             camera=camera.cropped(left, top, width, height),
             T_shown_camera=np.eye(4) if frame.id == order.frame_id else T_shown_world @ T_world_camera,
             explained=None if explained is None else np.ascontiguousarray(explained[rows, columns]),
+            color=None if color is None else np.ascontiguousarray(color[rows, columns]),
         )
 
     def _search_job(self, order: SearchOrder, model: ObjectModel) -> SearchJob:

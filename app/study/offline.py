@@ -199,6 +199,7 @@ class OfflineBatch:
             topic="",
             model_hash=self._data.model(view.object).content_hash,
             depth=self._data.depth(view.frame),
+            color=self._data.aligned_color(view.frame),
             camera=camera_of(view.frame),
             config=self._config,
             starts=tuple(BatchStart(T_camera_world @ one.T_world_object, one.seed) for one in samples),

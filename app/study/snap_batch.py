@@ -50,6 +50,8 @@ class SnapBatch(ImageJob[BatchResult]):
     """Snaps that know nothing of how far off their starts are, nor of other objects; `depth` is all of it."""
 
     starts: tuple[BatchStart, ...]
+    color: NDArray[np.uint8] | None
+    """(H, W, 3), aligned with the depth; None where there is none."""
 
     def run(self, known: ViewpointModel, tell: Tell) -> BatchResult:
         """One after the other; one that fails leaves the others as they are."""
@@ -61,7 +63,9 @@ class SnapBatch(ImageJob[BatchResult]):
         began, rng = time.perf_counter(), np.random.default_rng(start.seed)
         estimate = None
         try:
-            for step in snap_steps(known, self.depth, self.camera, start.T_camera_object, self.config, rng):
+            for step in snap_steps(
+                known, self.depth, self.camera, start.T_camera_object, self.config, rng, color=self.color
+            ):
                 tell((number + step.iteration / step.iterations) / len(self.starts))
                 estimate = step.estimate
         except ValueError as error:

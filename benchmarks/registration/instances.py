@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from benchmarks.registration.objects import APC_BOX, DATA, known_objects, with_symmetries, ycb_object
 from benchmarks.registration.starts import is_in_view
-from registration_core import Intrinsics, ObjectModel, pose
-from registration_core.bop import BopObject, read_dataset, read_depth
+from registration_core import Intrinsics, ObjectModel, color_is_aligned, pose
+from registration_core.bop import BopObject, read_color, read_dataset, read_depth
 from registration_core.mesh_error import imprecise
 from registration_core.sensor_families import DEMO, FAMILIES, draw_sensor, measure
 from registration_core.synthetic_scene import View, make_scene
@@ -80,6 +80,14 @@ class Instance:
     """(4, 4), where it is known."""
     alike: tuple[Array, ...] = ()
     """`T_camera_object` of what else in the image has this very shape: to depth they are one object."""
+
+    @cached_property
+    def aligned_color(self) -> NDArray[np.uint8] | None:
+        """(H, W, 3), the colour image where it is seen to be aligned with the depth."""
+        if self.color_path is None:
+            return None
+        color = read_color(self.color_path)
+        return color if color_is_aligned(color, self.depth) else None
 
     @property
     def truths(self) -> tuple[Array, ...]:

@@ -123,11 +123,12 @@ def _exact(group: Group) -> list[bool]:
     first = group.views[0]
     judge = Judge(first.model)
     views = [(one.depth, one.camera, one.T_world_camera) for one in group.views]
+    colors = [one.aligned_color for one in group.views]
     truth = pose.mean(np.array([one.T_world_camera @ one.truth for one in group.views]))
     begun = starts(first.truth, first.model, first.camera, group.shell, group.starts, first.seed)
     flags = []
     for n, T_start in enumerate(begun):
         T_world_object = pose.orthonormalised(first.T_world_camera @ T_start)
-        estimate = snap_views(first.model, views, T_world_object, rng=np.random.default_rng(n))
+        estimate = snap_views(first.model, views, T_world_object, rng=np.random.default_rng(n), colors=colors)
         flags.append(judge.error(estimate.T_world_object, truth).is_exact)
     return flags

@@ -14,13 +14,15 @@ Flags = NDArray[np.bool_]
 
 RIDGE = 0.003
 """Penalty on the squared weights of features scaled to unit variance, per decision; the intercept is free."""
+FREE = ("intercept", "color")
+"""Features that say nothing of a pose by themselves."""
 LOST = 0.002
 """Share of all snaps that may end wrong because a further round was left out."""
 
 
 def logistic_weights(features: Array, right: Flags, ridge: float = RIDGE) -> Array:
     """Weights (F,) of FEATURES (N, F) by which the flags (N,) are most probable; nothing that speaks for a
-    pose may speak against it.
+    pose may speak against it but what is in FREE.
     """
     scale = features.std(axis=0)
     scale[0] = 1.0
@@ -33,7 +35,7 @@ def logistic_weights(features: Array, right: Flags, ridge: float = RIDGE) -> Arr
         value = np.mean(np.logaddexp(0.0, logits) - target * logits) + ridge / 2.0 * penalised @ penalised
         return float(value), scaled.T @ (expit(logits) - target) / len(target) + ridge * penalised
 
-    bounds = [(None, None), *[(0.0, None)] * (len(FEATURES) - 1)]
+    bounds = [(None if name in FREE else 0.0, None) for name in FEATURES]
     found = minimize(loss, np.zeros(len(scale)), jac=True, method="L-BFGS-B", bounds=bounds)
     return found.x / scale
 

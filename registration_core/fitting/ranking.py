@@ -45,14 +45,16 @@ def judged_features(counts: Array, tails: Array) -> Array:
 
 def signs() -> list[tuple[float | None, float | None]]:
     """Bounds of each weight, where it is known what a class must mean: what is hidden, seen through or below
-    the plane never speaks for a pose, a match and nearness never against it.
+    the plane never speaks for a pose, nor does an outline where the colour is steady; a match, nearness and a
+    change of colour never speak against it.
     """
     bounds: list[tuple[float | None, float | None]] = [(None, None)] * (evidence.COUNT + 2)
     seen_through, seen_through_on_plane = evidence.OFF_BINS - 1, evidence.UNMEASURED - 1
     for part in (0, evidence.INSIDE_BINS):
         for against in (*evidence.HIDDEN, seen_through, seen_through_on_plane):
             bounds[part + against] = (None, 0.0)
-    bounds[evidence.BELOW] = (None, 0.0)
+    bounds[evidence.BELOW] = bounds[evidence.COLOR_STEADY] = (None, 0.0)
+    bounds[evidence.COLOR_CHANGES] = (0.0, None)
     bounds[evidence.COUNT] = bounds[evidence.COUNT + 1] = (0.0, None)
     return bounds
 

@@ -44,6 +44,8 @@ SETTINGS = {
     "alone": Setting(Layout(elevation=(0.3, 1.3), distance=(0.4, 0.9)), 1, 0, 1),
     "cut out": Setting(Layout(elevation=(0.3, 1.3), distance=(0.4, 0.9)), 1, 0, 1, is_cut_out=True),
 }
+FIRST = 2
+"""Label of the first thing in a picture."""
 WALL = 0.01
 """Thickness of a bin's walls, metres."""
 
@@ -68,6 +70,9 @@ class Picture:
     camera: Intrinsics
     depth: DepthImage
     """(H, W), metres, 0 = nothing there."""
+    labels: NDArray[np.uint8]
+    """(H, W), which thing is seen there: 0 nothing, 1 the table, from FIRST on all else, the known
+    objects first and the walls last."""
     seen: tuple[Seen, ...]
     kept: NDArray[np.bool_] | None
     """(H, W), the pixels that are left where the setting cuts the object out; None where all are."""
@@ -96,19 +101,22 @@ def picture(
     camera = random_camera(rng)
     T_camera_world = pose.inverse(cameras_around(1, rng, layout)[0])
     silhouettes = [Silhouette.of(thing, camera, T_camera_world) for thing in placed]
+    walls = [Placed(wall, np.eye(4)) for wall in bin_walls(placed, rng)] if kind.has_walls else []
+    everything_seen = silhouettes + [Silhouette.of(wall, camera, T_camera_world) for wall in walls]
     nearest = render_depth(table_model(), camera, T_camera_world)
+    labels = (nearest > 0.0).astype(np.uint8)
     nearest[nearest == 0.0] = np.inf
-    for wall in bin_walls(placed, rng) if kind.has_walls else []:
-        Silhouette.of(Placed(wall, np.eye(4)), camera, T_camera_world).draw_into(nearest)
-    for silhouette in silhouettes:
+    for silhouette in everything_seen:
         silhouette.draw_into(nearest)
+    for k, silhouette in enumerate(everything_seen):
+        silhouette.label_in(labels, nearest, FIRST + min(k, len(silhouettes)))
     seen = tuple(
         Seen(index, T_camera_world @ thing.T_world_object, silhouette.visible_share(nearest))
         for index, thing, silhouette in zip(indices, placed, silhouettes, strict=False)
     )
     perfect = np.where(np.isfinite(nearest), nearest, np.float32(0.0))
     own = render_depth(models[0], camera, seen[0].T_camera_object) > 0 if kind.is_cut_out else None
-    return Picture(setting, camera, perfect, seen, own)
+    return Picture(setting, camera, perfect, labels, seen, own)
 
 
 def bin_walls(placed: Sequence[Placed], rng: np.random.Generator) -> list[ObjectModel]:

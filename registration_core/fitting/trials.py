@@ -14,6 +14,7 @@ from registration_core import pose
 from registration_core.agreement import heavy_tails
 from registration_core.camera import project
 from registration_core.confidence import EXACT
+from registration_core.fitting.colors import colored
 from registration_core.fitting.objects import KINDS, random_object
 from registration_core.fitting.scenes import SETTINGS, Picture, Seen, picture
 from registration_core.kernels import Array32, centred, from_rows, to_rows
@@ -41,6 +42,8 @@ LEAST_VISIBLE = 0.3
 """Share of the silhouette that must show."""
 BORDER = 20
 """Pixels from the image's border within which no object's middle lies."""
+COLORED = 0.75
+"""Share of scenes that come with a colour image."""
 IMPRECISE, UNDECLARED = 0.75, 0.5
 """Share of objects whose mesh is a little wrong, and of those whose symmetries nobody has told."""
 RIGHT = 0.10
@@ -101,6 +104,7 @@ def scene_trials(seed: int, scene: int) -> list[Trial]:
     depth = measure(view.depth, view.camera, rng, draw_sensor(FAMILIES[family], rng))
     if view.kept is not None:
         depth = np.where(view.kept, depth, np.float32(0.0))
+    color = colored(view, rng) if rng.random() < COLORED else None
     trials: list[Trial] = []
     for seen in view.seen:
         if seen.visible < LEAST_VISIBLE or not _is_well_within(view, seen, objects[seen.index]):
@@ -109,7 +113,7 @@ def scene_trials(seed: int, scene: int) -> list[Trial]:
         told = told_model(kind, variant)
         for shell in rng.choice(len(SHELLS), STARTS, replace=False, p=SHARES):
             start = start_on(int(shell), seen.T_camera_object, told, rng)
-            run = started_run(told, depth, view, start, int(rng.integers(2**31)))
+            run = started_run(told, depth, color, view, start, int(rng.integers(2**31)))
             if run is not None:
                 trials.append(_trial(run, kind, variant, family, int(shell), view, seen))
     return trials
@@ -139,11 +143,16 @@ def start_on(shell: int, T_camera_object: Array, model: ObjectModel, rng: np.ran
 
 
 def started_run(
-    model: ObjectModel, depth: NDArray[np.float32], view: Picture, start: Array, seed: int
+    model: ObjectModel,
+    depth: NDArray[np.float32],
+    color: NDArray[np.uint8] | None,
+    view: Picture,
+    start: Array,
+    seed: int,
 ) -> SnapRun | None:
     """A snap about to begin; None where nothing of the object could be seen from there."""
     try:
-        problem = checked_problem(model, depth, view.camera, start, SnapConfig(), None)
+        problem = checked_problem(model, depth, view.camera, start, SnapConfig(), None, None, color)
     except ValueError:
         return None
     search = search_of(problem, np.random.default_rng(seed))

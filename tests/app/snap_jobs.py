@@ -26,7 +26,7 @@ def new_model() -> ObjectModel:
 
 def view_of(depth: np.ndarray, camera: Intrinsics) -> JobView:
     """The one image of a snap whose poses are in its camera."""
-    return JobView(depth, camera, np.eye(4), None)
+    return JobView(depth, camera, np.eye(4), None, None)
 
 
 def new_job(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
@@ -35,6 +36,21 @@ def test_depth_is_in_metres_and_cannot_be_written_to(data, frames):
     assert data.depth(frames[0]) is depth
     with pytest.raises(ValueError, match="read-only"):
         depth[0, 0] = 1.0
+
+
+def test_colour_is_handed_out_where_it_lies_on_the_depth(data, frames, files, tmp_path):
+    frame = frames[0]
+    color = data.aligned_color(frame)
+    assert np.array_equal(color, data.color(frame)) and data.aligned_color(frame) is color
+    with pytest.raises(ValueError, match="read-only"):
+        color[0, 0] = 1
+    for number, other in enumerate((np.roll(color, (30, 40), axis=(0, 1)), color[:-1])):
+        path = tmp_path / f"{number}.png"
+        Image.fromarray(other).save(path)
+        frame.color_hash = files.put_file(path)
+        assert data.aligned_color(frame) is None
+    frame.color_hash = None
+    assert data.aligned_color(frame) is None
 
 
 def test_the_camera_is_the_frames(frames):

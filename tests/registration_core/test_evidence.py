@@ -6,6 +6,8 @@ import pytest
 from registration_core import Intrinsics, SnapConfig, pose
 from registration_core.evidence import (
     BELOW,
+    COLOR_CHANGES,
+    COLOR_STEADY,
     COUNT,
     INSIDE_BINS,
     MATCHED,
@@ -110,7 +112,7 @@ def plate_in_front_of(beyond, on_plane):
     plane = np.array([0.0, 0.0, -1.0, beyond]) if on_plane else np.zeros(4)
     grid = Grid(
         depth, np.zeros((3, 200, 200), np.float32), np.ones_like(depth), *map(f4, (200, 200, 99.5, 99.5)),
-        nowhere, (alone == 0) & on_plane, plane,
+        nowhere, (alone == 0) & on_plane, plane, np.zeros((0, 0), np.bool_),
     )  # fmt: skip
     return grid, viewpoint_model(plate)
 
@@ -162,3 +164,46 @@ def test_shares_do_not_depend_on_the_resolution() -> None:
         observed = observe(depth, camera, truth[:3, 3], model, config, np.random.default_rng(0))
         counts.append(evidence(to_rows(truth), model, observed.grid, truth[2, 3])[0][:RING].sum())
     assert counts[0] == pytest.approx(counts[1], rel=0.05)
+
+
+def colored(scene, changes, **moves):
+    """(steady, changing) edges of the visible outline."""
+    model, grid, truth = scene
+    counts = counted((model, grid._replace(changes=changes), truth), **moves)
+    return counts[COLOR_STEADY], counts[COLOR_CHANGES]
+
+
+@pytest.mark.parametrize("block", [1, 2, 4])
+def test_colours_are_looked_at_along_the_visible_outline_only(scene, block) -> None:
+    model, grid, truth = scene
+    height, width = grid.depth.shape
+    steady = np.zeros((block * (height - 2), block * (width - 2)), np.bool_)
+    edges, none = colored(scene, steady)
+    assert none == 0.0 < edges < 0.4 * inside(counted(scene)).sum()
+    assert colored(scene, ~steady) == (0.0, edges)
+    hidden = model, grid._replace(depth=np.where(grid.depth > 0, f4(0.3), f4(0.0))), truth
+    assert sum(colored(hidden, steady)) < 0.1 * edges
+    known = model, grid._replace(known=np.ones_like(grid.known)), truth
+    assert colored(known, steady) == (0.0, 0.0)
+
+
+def test_without_a_colour_image_nothing_is_counted(scene) -> None:
+    assert scene[1].changes.size == 0
+    assert counted(scene)[COLOR_STEADY] == counted(scene)[COLOR_CHANGES] == 0.0
+
+
+@pytest.mark.parametrize("block", [1, 2, 4])
+def test_the_truth_ends_where_the_colour_changes(scene, block) -> None:
+    grid = scene[1]
+    height, width = grid.depth.shape
+    camera = Intrinsics(width, height, *map(float, (grid.fx, grid.fy, grid.cx, grid.cy)))
+    shape = render_depth(standing_tool().model, camera, standing_tool().truth)[1:-1, 1:-1] > 0
+    fine = np.kron(shape, np.ones((block, block), np.bool_))
+    changes = np.zeros(fine.shape, np.bool_)
+    for axis in range(2):
+        step = np.diff(fine, axis=axis) != 0
+        changes[tuple(slice(0, size) for size in step.shape)] |= step
+    steady, changing = colored(scene, changes)
+    assert changing > 0.9 * (steady + changing)
+    steady, changing = colored(scene, changes, x=0.02)
+    assert changing < 0.6 * (steady + changing)

@@ -42,8 +42,9 @@ def started(scene: SimpleScene, translation: float, degrees: float, seed: int):
     return pose.perturbed(scene.truth, translation, np.radians(degrees), np.random.default_rng(seed))
 
 
-def run(scene: SimpleScene, start, config=None, seed: int = 0, spread=None):
-    return snap(scene.model, scene.depth, scene.camera, start, config, np.random.default_rng(seed), spread)
+def run(scene: SimpleScene, start, config=None, seed: int = 0, spread=None, color=None):
+    rng = np.random.default_rng(seed)
+    return snap(scene.model, scene.depth, scene.camera, start, config, rng, spread, color=color)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -120,11 +121,12 @@ def test_crop_to_the_region_of_interest_gives_the_same_estimate(scene, config) -
     start = started(scene, 0.02, 15, 3)
     left, top, width, height = region_of_interest(scene.model, scene.camera, start, config)
     assert width < scene.camera.width or height < scene.camera.height
-    crop = scene.depth[top : top + height, left : left + width]
-    whole = run(scene, start, config)
+    crop = slice(top, top + height), slice(left, left + width)
+    color = np.random.default_rng(1).integers(0, 256, (*scene.depth.shape, 3)).astype(np.uint8)
+    whole = run(scene, start, config, color=color)
     part = snap(
-        scene.model, crop, scene.camera.cropped(left, top, width, height), start, config,
-        np.random.default_rng(0),
+        scene.model, scene.depth[crop], scene.camera.cropped(left, top, width, height), start, config,
+        np.random.default_rng(0), color=color[crop],
     )  # fmt: skip
     np.testing.assert_allclose(part.T_camera_object, whole.T_camera_object, atol=1e-9)
     assert part.confidence == pytest.approx(whole.confidence, abs=1e-9)
@@ -264,6 +266,7 @@ def broken(scene: SimpleScene) -> dict[str, dict]:
         "T_camera_object puts the object wholly outside the image": {"T_camera_object": aside},
         "T_camera_object puts the object wholly outside": {"T_camera_object": behind},
         "start_spread must be": {"start_spread": (0.1, -1.0)},
+        "color must be bytes": {"color": scene.depth},
     }
 
 

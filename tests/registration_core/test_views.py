@@ -170,6 +170,8 @@ def test_bad_input_is_named(views) -> None:
         (T_WORLD_OBJECT, [views[0], (depth[:5], camera, T)], {"used": 1}, r"views\[1\]: depth must have"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": []}, "explained must hold"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth > 0.5, None]}, "explained must hold"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"colors": []}, "colors must hold"),
+        (T_WORLD_OBJECT, [(depth, camera, T)], {"colors": [depth]}, r"views\[0\]: color must be"),
         (T_WORLD_OBJECT, [(depth, camera, T)], {"explained": [depth]}, r"views\[0\]: explained must be"),
     ):
         with pytest.raises(ValueError, match=message):

@@ -67,6 +67,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
         camera_of(frame),
         np.array(near["T_camera_object"]),
         rng=np.random.default_rng(7),
+        color=live.services.data.aligned_color(frame),
     )
     assert np.allclose(estimate["T_camera_object"], expected.T_camera_object, atol=1e-7)
     assert estimate["confidence"] == pytest.approx(expected.confidence)

@@ -117,6 +117,7 @@ def test_a_snap_can_be_repeated_from_what_is_stored(made):
         pose.inverse(T_world_camera) @ np.array(row.T_world_object_start),
         SnapConfig.from_dict(row.config),
         np.random.default_rng(row.seed),
+        color=data.aligned_color(frame),
     )
     assert np.array_equal(T_world_camera @ estimate.T_camera_object, row.T_world_object)
     assert (estimate.confidence, estimate.evaluations) == (row.confidence, row.evaluations)
