@@ -31,11 +31,18 @@ class PreparedObjects:
     Args:
         store: Where they are kept.
         submit: Hands an object to a worker, which builds it; the number is its priority.
+        later: Calls a function in a thread that may wait for the scheduler.
     """
 
-    def __init__(self, store: PreparedStore, submit: Callable[[ObjectModel, int], Future]) -> None:
+    def __init__(
+        self,
+        store: PreparedStore,
+        submit: Callable[[ObjectModel, int], Future],
+        later: Callable[..., None],
+    ) -> None:
         self._store = store
         self._submit = submit
+        self._later = later
         self._builds: dict[str, _Build] = {}
         self._lock = threading.Lock()
 
@@ -67,7 +74,7 @@ class PreparedObjects:
             content = self.read(model_hash)
             if content is None:
                 build.future = self._submit(model, priority)
-                build.future.add_done_callback(lambda done: self._on_built(model_hash, done))
+                build.future.add_done_callback(lambda done: self._later(self._on_built, model_hash, done))
             else:
                 self._end(model_hash, content)
         except Exception as error:

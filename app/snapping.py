@@ -82,7 +82,7 @@ class Snapper:
     def __init__(self, scheduler_address: str, workers: int, store: PreparedStore) -> None:
         self._scheduler_address = scheduler_address
         self._workers = workers
-        self._objects = PreparedObjects(store, self._submit_build)
+        self._objects = PreparedObjects(store, self._submit_build, self._later)
         self.topic = f"snap6d-{BOOT_ID}"
         """Where workers tell how far they are."""
         self._pending: dict[str, _Pending] = {}
@@ -195,6 +195,15 @@ class Snapper:
 
         self._calls.submit(function, *args).add_done_callback(report)
 
+    def _later(self, function: Callable[..., None], *args: Any) -> None:
+        """Do something that may wait for the scheduler, unless all is closed.
+
+        Dask calls back in one thread for all clients of a process: who waits there for what a closed client
+        was to bring, waits for ever, and all others with him. Calls of our own end before ours is closed.
+        """
+        with suppress(RuntimeError):  # of a pool that takes no more
+            self._calls.submit(function, *args)
+
     def _submit(self, snap_id: str, content: bytes | None) -> None:
         pending = self._find(snap_id)
         if pending is None:
@@ -209,7 +218,7 @@ class Snapper:
                 self._left[snap_id] = pending
             self._stop([snap_id])
             return
-        future.add_done_callback(lambda done: self._on_done(snap_id, done))
+        future.add_done_callback(lambda done: self._later(self._on_done, snap_id, done))
 
     def _submit_with_object(self, snap_id: str) -> None:
         """Submit a job again, whose worker does not know the object."""

@@ -52,6 +52,7 @@ class SampledView:
             config.to_dict(),
             [item.mesh_hash, item.mesh_format, item.symmetries],
             [frame.depth_hash, frame.depth_scale, frame.fx, frame.fy, frame.cx, frame.cy],
+            frame.color_hash,
             frame.T_world_camera,
         ]
         self._hash = hashlib.sha256(json.dumps(content, sort_keys=True).encode())

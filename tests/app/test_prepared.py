@@ -1,6 +1,7 @@
 """Objects are built once for all who ask, and what was built is kept."""
 
 import logging
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
 
@@ -27,6 +28,10 @@ class Builders:
         return self.futures[-1]
 
 
+def at_once(function: Callable[..., None], *args: object) -> None:
+    function(*args)
+
+
 @pytest.fixture
 def builders() -> Builders:
     return Builders()
@@ -34,7 +39,9 @@ def builders() -> Builders:
 
 @pytest.fixture
 def objects(tmp_path: Path, builders: Builders) -> PreparedObjects:
-    return PreparedObjects(PreparedStore(tmp_path / "prepared", VIEWPOINT_ALGORITHM), builders.submit)
+    return PreparedObjects(
+        PreparedStore(tmp_path / "prepared", VIEWPOINT_ALGORITHM), builders.submit, at_once
+    )
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +66,9 @@ def test_whoever_asks_while_it_is_built_waits_for_the_same(objects, builders, mo
 def test_what_was_built_outlives_the_program(objects, builders, model, content, tmp_path):
     objects.get(model, 0)
     builders.futures[0].set_result(content)
-    again = PreparedObjects(PreparedStore(tmp_path / "prepared", VIEWPOINT_ALGORITHM), builders.submit)
+    again = PreparedObjects(
+        PreparedStore(tmp_path / "prepared", VIEWPOINT_ALGORITHM), builders.submit, at_once
+    )
     assert again.read(model.content_hash) == content == again.get(model, 0).result()
     assert len(builders.asked) == 1
 
@@ -98,7 +107,7 @@ def test_workers_that_cannot_be_reached_fail_the_promise(tmp_path, model):
     def refuse(model: ObjectModel, priority: int) -> Future[bytes]:
         raise OSError("no scheduler")
 
-    objects = PreparedObjects(PreparedStore(tmp_path, VIEWPOINT_ALGORITHM), refuse)
+    objects = PreparedObjects(PreparedStore(tmp_path, VIEWPOINT_ALGORITHM), refuse, at_once)
     with pytest.raises(OSError, match="no scheduler"):
         objects.get(model, 0).result()
 

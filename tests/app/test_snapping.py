@@ -3,8 +3,10 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import closing
 from pathlib import Path
+from threading import Event, current_thread
 
 import dask
 import numpy as np
@@ -324,6 +326,45 @@ def test_workers_of_a_cluster_do_not_go_on_for_who_has_closed(cluster, model, tm
         assert outcome.moved.wait(LONGEST)
     with Client(cluster, set_as_default=False) as onlooker:
         wait_until(lambda: sum(onlooker.run(at_work).values()) == 0, "the worker to stop", seconds=5.0)
+
+
+def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
+    """Dask's one is every client's, and who waits there while his own closes may wait for ever."""
+    waited_in: list[str] = []
+
+    def noted(function: Callable[..., None]) -> Callable[..., None]:
+        def note(*args: object) -> None:
+            waited_in.append(current_thread().name.rstrip("_0123456789"))
+            function(*args)
+
+        return note
+
+    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
+        elsewhere._on_done = noted(elsewhere._on_done)
+        elsewhere._objects._on_built = noted(elsewhere._objects._on_built)
+        model = new_model()
+        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
+        assert isinstance(result_of(outcome), JobResult)
+    assert waited_in == ["snapping"] * 3  # the object was not known, is built, and the snap is done
+
+
+def test_what_ends_after_closing_is_not_waited_for(cluster, tmp_path):
+    held, free, told = Event(), Event(), Event()
+
+    def hold(_: object) -> None:
+        held.set()
+        free.wait(LONGEST)
+
+    with Client(cluster, set_as_default=False) as other:
+        other.submit(int, pure=False).add_done_callback(hold)  # in the thread that all clients share
+        assert held.wait(LONGEST)
+        with closing(Snapper(cluster, 1, store_in(tmp_path))) as closed:
+            promise = closed.built(new_model())
+        with pytest.raises(CancelledError):
+            promise.result(LONGEST)
+        free.set()
+        other.submit(int, pure=False).add_done_callback(lambda _: told.set())
+        assert told.wait(LONGEST)
 
 
 def test_without_a_scheduler_a_snap_says_so(model, tmp_path):
