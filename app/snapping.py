@@ -92,6 +92,8 @@ class Snapper:
         self._cluster: LocalCluster | None = None
         # Whatever talks to the scheduler happens here, so that no operator waits for it.
         self._calls = ThreadPoolExecutor(max_workers=4, thread_name_prefix="snapping")
+        # What jobs bring is taken in here, one result after the other, as they come.
+        self._results = ThreadPoolExecutor(max_workers=1, thread_name_prefix="results")
         self._client: PlannedCall[Client] = self._calls.submit(self._connect)
 
     def wait_until_ready(self) -> None:
@@ -158,7 +160,8 @@ class Snapper:
             self._left |= self._pending
             self._pending.clear()
         self._objects.close()
-        self._calls.shutdown(wait=True, cancel_futures=True)
+        for pool in (self._results, self._calls):
+            pool.shutdown(wait=True, cancel_futures=True)
         if self._client.done() and not self._client.cancelled() and self._client.exception() is None:
             with suppress(OSError):  # the scheduler may be gone already
                 self._stop(list(self._left))
@@ -202,7 +205,7 @@ class Snapper:
         was to bring, waits for ever, and all others with him. Calls of our own end before ours is closed.
         """
         with suppress(RuntimeError):  # of a pool that takes no more
-            self._calls.submit(function, *args)
+            self._results.submit(function, *args)
 
     def _submit(self, snap_id: str, content: bytes | None) -> None:
         pending = self._find(snap_id)

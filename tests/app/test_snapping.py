@@ -345,7 +345,7 @@ def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
         model = new_model()
         outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
         assert isinstance(result_of(outcome), JobResult)
-    assert waited_in == ["snapping"] * 3  # the object was not known, is built, and the snap is done
+    assert waited_in == ["results"] * 3  # the object was not known, is built, and the snap is done
 
 
 def test_what_ends_after_closing_is_not_waited_for(cluster, tmp_path):
