@@ -43,7 +43,7 @@ def variants() -> list[Variant]:
     selection, observation = DEFAULT.selection, DEFAULT.observation
     without_prior = replace(selection, prior=0.0), replace(agreement, prior=0.0)
     no_rings = (*selection.classes[:RING], *(0.0,) * (BELOW - RING), *selection.classes[BELOW:])
-    under_it = (*selection.classes[:BELOW], 0.0)
+    under_it = (*selection.classes[:BELOW], 0.0, *selection.classes[BELOW + 1 :])
     return [
         Variant("the default", DEFAULT),
         Variant("spread of the start told", DEFAULT, is_told=True),
