@@ -92,7 +92,7 @@ def grouped(
     modes = modes_of(apart, config.mode_radius)
     firsts = np.unique(modes)
     masses = softmax(np.array([scores[order][modes == first].max() for first in firsts]))
-    near = (apart[firsts] < EXACT) @ softmax(scores[order])
+    near = np.where(apart[firsts] < EXACT, softmax(scores[order]), 0.0).sum(axis=1)
     ranks = np.concatenate([[0], 1 + np.argsort(-masses[1:], kind="stable")])
     return Modes(order[firsts[ranks]], masses[ranks], near[ranks])
 

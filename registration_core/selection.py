@@ -56,9 +56,9 @@ def scores(counts: Array, tails: Array, config: SelectionConfig) -> Array:
     """Log-odds (N,) of candidates, up to a constant, of their counts (N, evidence.COUNT) and how far they are
     from the start, (N,) as `heavy_tails` gives it.
     """
-    return (
-        counts @ np.array(config.classes) + config.match_share * match_shares(counts) - config.prior * tails
-    )
+    # not by BLAS, whose sums depend on the number of its threads
+    evident = np.einsum("nc,c->n", counts, np.array(config.classes))
+    return np.asarray(evident + config.match_share * match_shares(counts) - config.prior * tails)
 
 
 def leads(candidates: Array32, counts: Array, config: SelectionConfig) -> Array:

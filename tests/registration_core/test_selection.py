@@ -5,10 +5,10 @@ import pytest
 
 from registration_core import SnapConfig, pose
 from registration_core.agreement import Prior
-from registration_core.evidence import evidence
+from registration_core.evidence import COUNT, evidence
 from registration_core.kernels import centred, f4, to_rows
 from registration_core.observation import observe
-from registration_core.selection import chosen, judge, leads, match_shares, shown_shares
+from registration_core.selection import chosen, judge, leads, match_shares, scores, shown_shares
 from registration_core.viewpoint_model import viewpoint_model
 from tests.registration_core.simple_scene import standing_tool
 
@@ -123,3 +123,10 @@ def test_share_that_is_shown_is_that_of_the_outline_which_nothing_hides(scene) -
     assert whole > 0.97
     assert 0.3 < half < 0.7
     assert none == 0.0
+
+
+def test_a_score_does_not_depend_on_what_else_is_judged() -> None:
+    rng, config = np.random.default_rng(0), SnapConfig().selection
+    counts, tails = rng.random((400, COUNT)), rng.random(400)
+    alone = [scores(counts[[k]], tails[[k]], config)[0] for k in range(400)]
+    assert scores(counts, tails, config).tolist() == alone

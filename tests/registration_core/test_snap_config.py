@@ -5,6 +5,7 @@ import json
 import pytest
 
 from registration_core import SnapConfig
+from registration_core.confidence import FEATURES
 from registration_core.snap_config import RoundConfig
 
 ONE_ROUND = SnapConfig(rounds=(RoundConfig(1.0, 2.0, 0.5),))
@@ -51,7 +52,7 @@ def test_stages_may_be_fewer() -> None:
         ({"rounds": [0.5]}, r"config.rounds\[0\] must be an object"),
         ({"confidence": {"mode_radius": 0}}, "config.confidence.mode_radius"),
         ({"confidence": {"temperature": 0.0}}, "config.confidence.temperature"),
-        ({"confidence": {"weights": [-1e9] * 7}}, r"config.confidence.weights\[0\]"),
+        ({"confidence": {"weights": [-1e9] * len(FEATURES)}}, r"config.confidence.weights\[0\]"),
         ({"spread": {"translation": 0}}, "config.spread.translation"),
         ({"spread": {"search": -1}}, "config.spread.search"),
         ({"stages": [{"niche_translation": 0}]}, r"config.stages\[0\].niche_translation"),
