@@ -56,7 +56,7 @@ def done_here(job: SnapJob, model: ObjectModel) -> Estimate:
 
 
 def assert_same(a: Estimate, b: Estimate) -> None:
-    """Equal but for the time it took: poses to the last bit; the rest up to rounding, since a snap in one view
+    """Equal but for the time it took: poses to the last bit; the rest up to rounding, since a snap in a view
     and one in views that are just one may differ in their last digits.
     """
     assert np.array_equal(a.T_camera_object, b.T_camera_object)
