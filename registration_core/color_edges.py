@@ -37,7 +37,7 @@ def color_changes(color: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Pixels (H, W) of an image (H, W, 3) with a gradient well above what is usual in it."""
     if color.size == 0:
         return np.zeros(color.shape[:2], np.bool_)
-    gradients = _gradients(np.ascontiguousarray(color))
+    gradients = _gradients(np.array(color, order="C"))  # a copy: a read-only image would be compiled for anew
     usual = np.median(gradients[::SPARSE, ::SPARSE])
     return np.asarray(gradients > f4(MORE * (usual + NOISE)))
 
@@ -51,7 +51,7 @@ def color_is_aligned(color: ArrayLike, depth: ArrayLike) -> bool:
     rows, columns = np.nonzero(_inner(depth_steps(np.asarray(depth, dtype=np.float32)), ASIDE))
     if len(rows) < LEAST_STEPS:
         return False
-    change = np.log(_gradients(np.ascontiguousarray(color)) + f4(NOISE))
+    change = np.log(_gradients(np.array(color, order="C")) + f4(NOISE))
     aside = [
         change[rows + down, columns + right].mean()
         for down, right in ((-ASIDE, 0), (ASIDE, 0), (0, -ASIDE), (0, ASIDE))

@@ -17,7 +17,7 @@ from registration_core.views import snap_views
 def warm_up() -> None:
     """Compile or load every kernel by a few tiny snaps, so that the first real one is fast.
 
-    They meet what any snap may meet: a start that is off, a supporting plane, a symmetry, a reduced image.
+    They meet what any snap may: a start that is off, a supporting plane, a symmetry, a reduced image, colour.
     """
     box = trimesh.creation.box((0.08, 0.05, 0.03))
     half_turn = discrete([np.diag([-1.0, -1.0, 1.0, 1.0])])
@@ -29,7 +29,8 @@ def warm_up() -> None:
     start = pose.perturbed(T, 0.03, 0.4, np.random.default_rng(0))
     short = SnapConfig(method="particle_filter", particle_filter=ParticleFilterConfig(8, 2))
     whole = SnapConfig(rounds=(RoundConfig(share=0.3, widening=1.0, doubt=1.0),))
+    color = np.zeros((*depth.shape, 3), np.uint8)
     for config in (whole, short):
-        snap(model, depth, camera, start, config, np.random.default_rng(0))
+        snap(model, depth, camera, start, config, np.random.default_rng(0), color=color)
     snap_views(model, [(depth, camera, np.eye(4))], start, whole, np.random.default_rng(0))
     propose(model, depth, camera, config=SnapConfig(anywhere=AnywhereConfig(2_000, 500)))

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from numba.core.dispatcher import Dispatcher
 from registration_core import SnapConfig, pose, propose, region_of_interest, snap, snap_steps, snap_views
-from registration_core import warm_up
+from registration_core import color_is_aligned, warm_up
 from registration_core.procedural_objects import demo_objects
 from registration_core.rasterizer import render_depth
 from tests.registration_core.simple_scene import standing_tool
@@ -36,6 +36,12 @@ for model in [scene.model, *(known.model for known in demo_objects())]:
         snap(model, given, seen_by, start, None, np.random.default_rng(0))
     for given in (depth, depth.astype(np.float64), depth.tolist(), np.asfortranarray(depth)):
         snap(model, given, scene.camera, start, None, np.random.default_rng(0), (0.02, 0.2))
+    color = np.random.default_rng(1).integers(0, 256, (*depth.shape, 3)).astype(np.uint8)
+    color.setflags(write=False)
+    assert not color_is_aligned(color, depth)
+    snap(model, depth, scene.camera, start, None, np.random.default_rng(0), color=color)
+    crop = color[top:top + height, left:left + width]
+    snap(model, part, seen_by, start, None, np.random.default_rng(0), color=crop)
     snap_views(model, [(depth, scene.camera, np.eye(4))], start, rng=np.random.default_rng(0))
     propose(model, depth, scene.camera, (left, top, width, height), rng=np.random.default_rng(0))
     steps = snap_steps(model, depth, scene.camera, truth, SnapConfig.paper(), np.random.default_rng(0))
