@@ -6,6 +6,7 @@ import shutil
 import tempfile
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
@@ -13,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from app.database import Database
 from app.importing import DatasetImportError, ImportSummary, import_dataset
 from app.storage import FileStore
+from registration_core.bop_layout import find_root
 
 UNREADABLE = (
     zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, zlib.error, lzma.LZMAError
@@ -23,33 +25,40 @@ IMPOSSIBLE_NAME = frozenset({errno.EEXIST, errno.EISDIR, errno.ENOTDIR, errno.EN
 
 
 def import_archive(
-    database: Database, files: FileStore, archive: Path, name: str, max_bytes: int
+    database: Database,
+    files: FileStore,
+    archive: Path,
+    name: str,
+    max_bytes: int,
+    depth_scale: float | None = None,
 ) -> ImportSummary:
-    """Import a zip file that holds one BOP dataset, at its top or in one folder.
+    """Import a zip file that holds one BOP dataset, at its top or in a folder, as `import_dataset` does.
 
     Raises:
         ValueError: in one sentence, as `import_dataset` does, and where the archive is no sound zip file, is
             too large when unpacked, or has an entry that would climb out of its folder.
     """
     with _unpacked(archive, max_bytes) as folder:
-        inner = [entry for entry in folder.iterdir() if entry.name != "__MACOSX"]
-        root = inner[0] if len(inner) == 1 and inner[0].is_dir() else folder
-        return import_dataset(database, files, root, name if root == folder else root.name)
+        root = find_root(folder)
+        name = name if root == folder else root.name
+        return import_dataset(database, files, root, name, depth_scale=depth_scale)
 
 
 @contextmanager
 def _unpacked(archive: Path, max_bytes: int) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(dir=archive.parent) as folder:
+    with tempfile.TemporaryDirectory(dir=archive.parent) as temporary:
+        folder = Path(temporary) / "archive"  # a name for messages
         try:
-            _unpack(archive, Path(folder), max_bytes)
+            _unpack(archive, folder, max_bytes)
         except UNREADABLE as error:
             raise DatasetImportError(
                 f"the upload is no readable zip file ({error}); pack the dataset again"
             ) from error
-        yield Path(folder)
+        yield folder
 
 
 def _unpack(archive: Path, folder: Path, max_bytes: int) -> None:
+    folder.mkdir()
     with zipfile.ZipFile(archive) as source:
         entries = source.infolist()
         if sum(entry.file_size for entry in entries) > max_bytes:
@@ -58,6 +67,7 @@ def _unpack(archive: Path, folder: Path, max_bytes: int) -> None:
             )
         for entry in entries:
             _check_entry(entry)
+        _check_names([_path_of(entry) for entry in entries if not _is_folder(entry)])
         for entry in entries:
             try:
                 _extract(source, entry, folder)
@@ -69,17 +79,33 @@ def _unpack(archive: Path, folder: Path, max_bytes: int) -> None:
                 ) from error
 
 
+def _path_of(entry: zipfile.ZipInfo) -> PurePosixPath:
+    """Where an entry goes; archives of some Windows programs part folders by backslashes."""
+    return PurePosixPath(entry.filename.replace("\\", "/"))
+
+
+def _is_folder(entry: zipfile.ZipInfo) -> bool:
+    return entry.filename.endswith(("/", "\\"))
+
+
 def _check_entry(entry: zipfile.ZipInfo) -> None:
-    path = PurePosixPath(entry.filename.replace("\\", "/"))
+    path = _path_of(entry)
     is_link = (entry.external_attr >> 16) & 0o170000 == 0o120000
     if path.is_absolute() or ".." in path.parts or ":" in "".join(path.parts[:1]) or is_link:
         raise DatasetImportError(f"the archive's entry {entry.filename!r} leads out of its folder; remove it")
 
 
+def _check_names(paths: list[PurePosixPath]) -> None:
+    """Raise where an entry would take the place of another."""
+    twice = next((path for path, count in Counter(paths).items() if count > 1), None)
+    if twice is not None:
+        raise DatasetImportError(f"the archive has the entry {str(twice)!r} twice; keep one of the two")
+
+
 def _extract(source: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path) -> None:
     """Unpack one entry, but never more than it announced."""
-    target = folder / entry.filename
-    if entry.is_dir():
+    target = folder / _path_of(entry)
+    if _is_folder(entry):
         target.mkdir(parents=True, exist_ok=True)
         return
     target.parent.mkdir(parents=True, exist_ok=True)

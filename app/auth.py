@@ -1,9 +1,11 @@
 """Who may do what: users, roles, passwords, login sessions, API tokens and one-time sign-in links."""
 
 import hashlib
+import math
 import secrets
 import threading
-import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from enum import StrEnum
@@ -14,14 +16,16 @@ from sqlalchemy.orm import Session
 
 from app.database import Database
 from app.tables import Credential, User, utc_now
+from app.throttle import Throttle
 
 LOCAL_ADMINISTRATOR = "admin"
 """Whoever runs commands on the machine of the server."""
 LOGIN_LIFETIME = timedelta(days=14)
 LINK_LIFETIME = timedelta(hours=12)
-FREE_ATTEMPTS = 5
-"""Wrong passwords for one name before waiting begins; it doubles with each further one."""
-LONGEST_WAIT_SECONDS = 300.0
+CHECKS_AT_ONCE = 2
+"""Passwords that are hashed at a time; ..."""
+CHECKS_WAITING = 8
+"""... and that wait for it, each keeping a thread of the server."""
 SHORTEST_PASSWORD = 8
 
 
@@ -65,17 +69,23 @@ class SignInError(Exception):
 
 
 class TooManyAttemptsError(SignInError):
-    """Signing in under this name has to wait."""
+    """Signing in has to wait."""
 
 
 class Auth:
-    """Users and their credentials in the database; only hashes of secrets are kept."""
+    """Users and their credentials in the database; only hashes of secrets are kept.
 
-    def __init__(self, database: Database) -> None:
+    Args:
+        database: Where they are.
+        throttle: Counts wrong passwords; in memory where it is None.
+    """
+
+    def __init__(self, database: Database, throttle: Throttle | None = None) -> None:
         self._database = database
         self._passwords = PasswordHash.recommended()
         self._unknown_user_hash = self._passwords.hash(secrets.token_urlsafe())
-        self._throttle = _Throttle()
+        self._throttle = throttle or Throttle()
+        self._checks = _PasswordChecks()
 
     def create_user(self, name: str, role: Role, password: str | None = None) -> User:
         """Add a user; without a password only links and tokens sign in.
@@ -122,22 +132,23 @@ class Auth:
             raise ValueError(f"user {name!r} has the role {user.role}, not {role}; choose another name")
         return user
 
-    def sign_in(self, name: str, password: str) -> str:
-        """A new login session's secret, for the right name and password.
+    def sign_in(self, name: str, password: str, address: str) -> str:
+        """A new login session's secret, for the right name and password, asked for from a network address.
 
         Raises:
             SignInError: where they are wrong, or were wrong too often just now.
         """
         name = name.strip()
-        self._throttle.check(name)
-        with self._database.read() as session:
-            user = _find_user(session, name)
-        # An unknown name takes as long as a known one, so that names cannot be guessed by the clock.
-        expected = user.password_hash if user and user.password_hash else self._unknown_user_hash
-        if not self._passwords.verify(password, expected) or user is None or user.password_hash is None:
-            self._throttle.failed(name)
+        with self._checks.one():
+            wait = self._throttle.attempt(name, address)
+            if wait > 0:
+                raise TooManyAttemptsError(
+                    f"too many wrong passwords; wait {math.ceil(wait)} seconds and try again"
+                )
+            user = self._user_with_password(name, password)
+        if user is None:
             raise SignInError("this name and password do not belong together; check both and try again")
-        self._throttle.succeeded(name)
+        self._throttle.succeeded(name, address)
         return self._issue("session", user.id, LOGIN_LIFETIME)
 
     def sign_in_with_link(self, secret: str) -> str:
@@ -169,9 +180,13 @@ class Auth:
             return add_credential(session, "session", link.user_id, LOGIN_LIFETIME)
 
     def sign_out(self, secret: str) -> None:
-        """End a login session."""
+        """End a login session; any other secret is left alone."""
         with self._database.write() as session:
-            session.execute(delete(Credential).where(Credential.secret_hash == _hashed(secret)))
+            session.execute(delete(Credential).filter_by(kind="session", secret_hash=_hashed(secret)))
+
+    def close(self) -> None:
+        """Close what is not the database's."""
+        self._throttle.close()
 
     def create_link(self, user_id: int) -> str:
         """The secret of a new one-time sign-in link."""
@@ -189,6 +204,17 @@ class Auth:
         """Whose API token this is."""
         return self._identify("token", secret, Actor.SCRIPT)
 
+    def _user_with_password(self, name: str, password: str) -> User | None:
+        """The user of this name, where the password is theirs.
+
+        An unknown name costs the same work as a known one, so that names cannot be guessed by the clock.
+        """
+        with self._database.read() as session:
+            user = _find_user(session, name)
+        kept = user.password_hash if user is not None else None
+        is_right = self._passwords.verify(password, kept or self._unknown_user_hash)
+        return user if is_right and kept else None
+
     def _identify(self, kind: str, secret: str, actor: Actor) -> Identity | None:
         with self._database.read() as session:
             credential = _find_credential(session, kind, secret)
@@ -202,32 +228,23 @@ class Auth:
             return add_credential(session, kind, user_id, lifetime, name)
 
 
-class _Throttle:
-    """Makes guessing passwords slow, name by name."""
+class _PasswordChecks:
+    """Lets few passwords be hashed at a time: each takes 64 MB and a core."""
 
     def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._failures: dict[str, tuple[int, float]] = {}
+        self._places = threading.BoundedSemaphore(CHECKS_AT_ONCE + CHECKS_WAITING)
+        self._running = threading.BoundedSemaphore(CHECKS_AT_ONCE)
 
-    def check(self, name: str) -> None:
-        with self._lock:
-            count, last = self._failures.get(name, (0, 0.0))
-        if count < FREE_ATTEMPTS:
-            return
-        wait = min(LONGEST_WAIT_SECONDS, 2.0 ** (count - FREE_ATTEMPTS)) - (time.monotonic() - last)
-        if wait > 0:
-            raise TooManyAttemptsError(
-                f"too many wrong passwords for this name; wait {wait:.0f} seconds and try again"
-            )
-
-    def failed(self, name: str) -> None:
-        with self._lock:
-            count, _ = self._failures.get(name, (0, 0.0))
-            self._failures[name] = (count + 1, time.monotonic())
-
-    def succeeded(self, name: str) -> None:
-        with self._lock:
-            self._failures.pop(name, None)
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """Do one, after those before; raises `TooManyAttemptsError` where too many wait already."""
+        if not self._places.acquire(blocking=False):
+            raise TooManyAttemptsError("too many people sign in at this moment; try again in some seconds")
+        try:
+            with self._running:
+                yield
+        finally:
+            self._places.release()
 
 
 def _hashed(secret: str) -> str:

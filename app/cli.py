@@ -2,14 +2,15 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from app.study_cli import study_cli
-from app.terminal import checked_database, console, fail, open_database, progress_bar, read_settings
+from app.terminal import checked_database, console, fail, open_database, progress, read_settings
 
 if TYPE_CHECKING:
+    from app.config import Settings
     from app.database import Database
 
 cli = typer.Typer(no_args_is_help=True, add_completion=False, help="Annotate 6-DoF object poses, with help.")
@@ -29,7 +30,9 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("SNAP6D_DEBUG"):
             raise
-        fail(str(error) or type(error).__name__)
+        from app.storage_faults import told
+
+        fail(told(error))
 
 
 @cli.command()
@@ -47,6 +50,7 @@ def serve(
     """Start Snap6D and print a link to sign in with."""
     from app.listening import listen
     from app.snapping import create_snapper
+    from app.state_lock import held
 
     given = {
         "host": host,
@@ -58,14 +62,14 @@ def serve(
     }
     settings = read_settings(**given)
     listener = listen(settings)
-    settings.state_dir.mkdir(parents=True, exist_ok=True)
-    snapper = create_snapper(settings)
-    try:
-        from app import server  # its imports take seconds, in which the workers start
+    with held(settings.state_dir, settings.host, listener.getsockname()[1]):
+        snapper = create_snapper(settings)
+        try:
+            from app import server  # its imports take seconds, in which the workers start
 
-        server.run(settings, listener, snapper, prepare, console.print)
-    finally:
-        snapper.close()
+            server.run(settings, listener, snapper, prepare, console.print)
+        finally:
+            snapper.close()
 
 
 @cli.command()
@@ -76,10 +80,64 @@ def migrate() -> None:
     console.print("The database is up to date.")
 
 
+@cli.command("check")
+def check_command() -> None:
+    """Examine the database and all stored files, and say what is wrong and what to do."""
+    from app.checkup import examine
+    from app.stored_files import open_store
+
+    settings = read_settings()
+    database = open_database(settings)
+    with progress("checking") as on_progress:
+        found = examine(
+            database,
+            open_store(settings.files_dir, database),
+            on_progress,
+        )
+    for fault in found.faults:
+        console.print(fault)
+    if found.unnamed:
+        console.print(
+            f"{found.unnamed} files ({found.unnamed_bytes / 1e6:.1f} MB) in {settings.files_dir} are named by"
+            " no row; they are left from interrupted imports and do no harm."
+        )
+    if found.faults:
+        fail(f"{len(found.faults)} faults were found; they are listed above")
+    console.print(f"The database and its {found.files} files are sound.")
+
+
+@cli.command("backup")
+def backup_command(file: Annotated[Path, typer.Argument(help="Archive to write; ends in .tar.")]) -> None:
+    """Write the database and all stored files into one archive, also while a server runs."""
+    from app.backup import back_up
+    from app.stored_files import open_store
+
+    if file.suffix != ".tar":
+        fail(f"{file} does not end in .tar; a backup is a tar archive")
+    settings = read_settings()
+    database = checked_database(settings)
+    with progress("backing up") as on_progress:
+        done = back_up(
+            database,
+            open_store(settings.files_dir, database),
+            file,
+            on_progress,
+        )
+    for fault in done.faults:
+        console.print(fault)
+    if done.faults:
+        fail(f"{file} was written without {len(done.faults)} files that are damaged; they are listed above")
+    console.print(f"{file}: the database and {done.files} files.")
+
+
 @cli.command("import")
 def import_command(
     path: Annotated[Path, typer.Argument(help="Folder of a BOP dataset.")],
     name: Annotated[str | None, typer.Option(help="Another name for the dataset.")] = None,
+    depth_scale: Annotated[
+        float | None,
+        typer.Option(help="In the place of the dataset's own: raw depth times it is millimetres."),
+    ] = None,
 ) -> None:
     """Import a BOP dataset; repeating it adds only what is new."""
     from app.importing import import_dataset
@@ -87,15 +145,18 @@ def import_command(
 
     settings = read_settings()
     database = checked_database(settings)
-    with progress_bar() as progress:
-        task = progress.add_task("checking", total=1.0)
+    with progress("checking") as on_progress:
         summary = import_dataset(
             database,
             FileStore(settings.files_dir),
             path,
             name,
-            lambda share, what: progress.update(task, completed=share, description=what),
+            on_progress,
+            depth_scale,
         )
+    for warning in summary.warnings:
+        where = f" ({'; '.join(warning.images)})" if warning.images else ""
+        console.print(f"Odd: {warning.text}{where}.")
     console.print(
         f"Dataset {summary.name}: {summary.objects} new objects, {summary.scenes} new scenes,"
         f" {summary.frames} new frames, {summary.tasks} new tasks."
@@ -106,22 +167,25 @@ def import_command(
 def export_command(
     dataset: Annotated[str, typer.Argument(help="Name of the dataset.")],
     out: Annotated[Path, typer.Argument(help="Zip file to write.")],
+    export_format: Annotated[
+        Literal["bop", "csv"], typer.Option("--format", help="A whole BOP dataset, or its poses alone.")
+    ] = "bop",
 ) -> None:
-    """Export the submitted poses of a dataset in BOP format, checked by reading them back."""
+    """Export the submitted poses of a dataset, checked by reading them back."""
     from app.export.job import export_dataset
-    from app.storage import FileStore
+    from app.stored_files import open_store
 
     settings = read_settings()
     database = checked_database(settings)
     dataset_id = _dataset_id(database, dataset)
-    with progress_bar() as progress:
-        task = progress.add_task("exporting", total=1.0)
+    with progress("exporting") as on_progress:
         summary = export_dataset(
             database,
-            FileStore(settings.files_dir),
+            open_store(settings.files_dir, database),
             dataset_id,
             out,
-            lambda share, what: progress.update(task, completed=share, description=what),
+            on_progress,
+            export_format,
         )
     console.print(
         f"{out}: {summary.annotations} poses in {summary.images} images of {summary.scenes} scenes, read back"
@@ -138,7 +202,7 @@ def calibrate_command(
     from app.calibrating import calibrate, experience_of, forget, keep, told
     from app.scene_data import SceneData
     from app.standards import Standards
-    from app.storage import FileStore
+    from app.stored_files import open_store
 
     settings = read_settings()
     database = checked_database(settings)
@@ -149,17 +213,16 @@ def calibrate_command(
         console.print(
             f"Dataset {dataset} goes by the shipped calibration again."
             if had_one
-            else f"Dataset {dataset} has no calibration of its own.",
-            markup=False,
+            else f"Dataset {dataset} has no calibration of its own."
         )
         return
-    known = experience_of(database, SceneData(FileStore(settings.files_dir)), dataset_id)
+    known = experience_of(database, SceneData(open_store(settings.files_dir, database)), dataset_id)
     row, gains = calibrate(known, Standards(database, settings.risk).of(dataset_id).risk)
     with database.write() as session:
         keep(session, dataset_id, row)
     for line in told(gains):
-        console.print(line, markup=False)
-    console.print(f"Snaps of dataset {dataset} go by this from now on; --reset takes it back.", markup=False)
+        console.print(line)
+    console.print(f"Snaps of dataset {dataset} go by this from now on; --reset takes it back.")
 
 
 @token_cli.command("create")
@@ -178,27 +241,36 @@ def add_user(
 ) -> None:
     """Add a person, and print a one-time link to sign in with."""
     from app.auth import Auth
-    from app.listening import sign_in_link
 
     settings = read_settings()
     auth = Auth(checked_database(settings))
     secret = typer.prompt("Password", hide_input=True, confirmation_prompt=True) if password else None
     user = auth.create_user(name, _role(role), secret)
     console.print(f"User {user.name} may sign in, once, with this link:")
-    console.print(sign_in_link(settings, settings.port, auth.create_link(user.id)))
+    console.print(_link(settings, auth.create_link(user.id)))
 
 
 @user_cli.command("link")
 def link_user(name: str) -> None:
     """Print a one-time link for a person who is there already."""
     from app.auth import Auth
-    from app.listening import sign_in_link
 
     settings = read_settings()
     auth = Auth(checked_database(settings))
-    link = sign_in_link(settings, settings.port, auth.create_link(auth.user(name).id))
+    link = _link(settings, auth.create_link(auth.user(name).id))
     console.print(f"User {name} may sign in, once, with this link:")
     console.print(link)
+
+
+def _link(settings: "Settings", secret: str) -> str:
+    """A sign-in link to where the server of the state folder listens, or would by the settings."""
+    from app.listening import sign_in_link
+    from app.state_lock import running_server
+
+    running = running_server(settings.state_dir)
+    if running is not None:
+        settings = settings.model_copy(update={"host": running.host, "port": running.port})
+    return sign_in_link(settings, settings.port, secret)
 
 
 def _dataset_id(database: "Database", name: str) -> int:

@@ -40,6 +40,11 @@ class Settings(BaseSettings):
     public_url: str = ""
     """Address under which browsers reach the app, where a reverse proxy stands in front."""
 
+    host_names: str = ""
+    """Further names of the machine under which browsers reach the app, separated by commas."""
+    trusted_proxies: str = ""
+    """Addresses or networks of reverse proxies, separated by commas: they say for whom they ask."""
+
     @property
     def resolved_database_url(self) -> str:
         """`database_url`, or SQLite in the state directory."""
@@ -49,6 +54,11 @@ class Settings(BaseSettings):
     def files_dir(self) -> Path:
         """Where the file store keeps its content."""
         return self.state_dir / "files"
+
+    @property
+    def throttle_file(self) -> Path:
+        """Where wrong passwords are counted."""
+        return self.state_dir / "throttle.sqlite"
 
     @property
     def prepared_dir(self) -> Path:

@@ -9,14 +9,17 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, create_engine, event
+from sqlalchemy import Connection, create_engine, event, func, select
 from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.orm import Session
 
 from app.config import PROJECT
+from app.storage_faults import advice
 
 BUSY_TIMEOUT_SECONDS = 20
+SERVER_LOCK = int.from_bytes(b"Snap6D")
+"""Number of PostgreSQL's advisory lock that a server holds."""
 
 
 class DatabaseError(Exception):
@@ -65,7 +68,7 @@ class Database:
             with self.engine.connect() as connection:
                 found = MigrationContext.configure(connection).get_current_revision()
         except DBAPIError as error:
-            raise DatabaseError(f"the database cannot be opened: {error.orig}") from error
+            raise DatabaseError(f"the database cannot be opened: {advice(error) or error.orig}") from error
         wanted = ScriptDirectory.from_config(_alembic_config()).get_current_head()
         if found == wanted:
             return
@@ -90,6 +93,30 @@ class Database:
                 )
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
+
+    @contextmanager
+    def kept_to_one_server(self) -> Iterator[None]:
+        """Keep a PostgreSQL database to this server until the block ends, however it ends.
+
+        Two would fail each other's exports, and lack each other's files. An SQLite database lies in the state
+        folder, which is one server's already.
+
+        Raises:
+            DatabaseError: where another server works on it.
+        """
+        if self._is_sqlite:
+            yield
+            return
+        with self.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            if not connection.scalar(select(func.pg_try_advisory_lock(SERVER_LOCK))):
+                raise DatabaseError(
+                    "another Snap6D server works on this database; stop that one, or give this one a database"
+                    " of its own by --database-url"
+                )
+            try:
+                yield
+            finally:
+                connection.scalar(select(func.pg_advisory_unlock(SERVER_LOCK)))
 
     def close(self) -> None:
         """Close all connections."""

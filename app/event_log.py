@@ -15,6 +15,10 @@ STATE_AFTER = {"submit": "submitted", "skip": "skipped", "reopen": "open"}
 """Events that end a registration or begin it anew, and how it stands then."""
 
 
+class ErasedError(Exception):
+    """A registration is not there any more: what its participant did was erased. The message may be shown."""
+
+
 @dataclass(frozen=True)
 class NewEvent:
     """One thing that happened, before it is written down."""
@@ -46,8 +50,14 @@ class EventLog:
 
         A `submit` event also closes the registration with its pose, a `skip` with its reason; a `reopen`
         event takes both back.
+
+        Raises:
+            ErasedError: where the registration was erased meanwhile.
         """
         with self._database.write() as session:
+            registration = session.get(Registration, registration_id)
+            if registration is None:
+                raise ErasedError(f"registration {registration_id} was erased")
             last = session.scalar(
                 select(func.max(Event.sequence)).where(Event.registration_id == registration_id)
             )
@@ -72,7 +82,6 @@ class EventLog:
             if estimate is not None:
                 session.add(estimate)
             if event.kind in STATE_AFTER:
-                registration = session.get_one(Registration, registration_id)
                 submitted = event.kind == "submit"
                 registration.state = STATE_AFTER[event.kind]
                 registration.T_world_object = event.T_after if submitted else None

@@ -2,18 +2,20 @@
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import AsyncIterator
 
-import httpx
 from fastapi import FastAPI
 
 from app import __version__, pages
 from app.analysis.kept import Kept
 from app.api import (
+    body_limits,
     copies,
     datasets,
     exports,
     health,
+    host_names,
     objects,
     participation,
     placement,
@@ -41,6 +43,7 @@ from app.event_log import EventLog
 from app.export_jobs import ExportJobs
 from app.labeling import proxy
 from app.labeling.desk import Desk
+from app.memory import give_back
 from app.preparation import Preparation
 from app.replay import proxy as replay_proxy
 from app.replay.replays import Replays
@@ -48,8 +51,12 @@ from app.scene_data import SceneData
 from app.services import Services
 from app.snapping import Snapper, create_snapper
 from app.standards import Standards
-from app.storage import FileStore
+from app.stored_files import open_store
 from app.study.studies import Studies
+from app.throttle import Throttle
+from app.unfinished import clear_unfinished
+
+logger = logging.getLogger(__name__)
 
 SECONDS_BETWEEN_CLEANINGS = 60.0
 
@@ -62,7 +69,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
     """
     database = Database(settings.resolved_database_url)
     database.check_version()
-    files = FileStore(settings.files_dir)
+    files = open_store(settings.files_dir, database)
     log = EventLog(database)
     data = SceneData(files)
     snapper = snapper or create_snapper(settings)
@@ -71,7 +78,7 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         settings=settings,
         database=database,
         files=files,
-        auth=Auth(database),
+        auth=Auth(database, Throttle(settings.throttle_file)),
         log=log,
         data=data,
         snapper=snapper,
@@ -89,13 +96,13 @@ def create_app(services: Services) -> FastAPI:
     """The web application around the services; it closes them when it ends."""
 
     @contextlib.asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        settings = services.settings
+        clear_unfinished(settings.state_dir, settings.files_dir, settings.prepared_dir)
         services.export_jobs.fail_interrupted()
         services.preparation.start()
         cleaning = asyncio.create_task(_clean_up(services))
-        async with httpx.AsyncClient() as client:
-            app.state.http = client
-            yield
+        yield
         cleaning.cancel()
         await asyncio.to_thread(_close, services)
 
@@ -111,6 +118,8 @@ def create_app(services: Services) -> FastAPI:
     )
     app.state.services = services
     problems.install(app)
+    app.add_middleware(body_limits.BodyLimits, uploads={datasets.router.prefix})
+    app.add_middleware(host_names.HostNames)
     for module in (
         health,
         sign_in,
@@ -143,10 +152,18 @@ def create_app(services: Services) -> FastAPI:
 
 
 async def _clean_up(services: Services) -> None:
+    closed_before = 0
     while True:
         await asyncio.sleep(SECONDS_BETWEEN_CLEANINGS)
-        await asyncio.to_thread(services.desk.close_idle)
-        await asyncio.to_thread(services.replays.close_idle)
+        closed = 0
+        for close_idle in (services.desk.close_idle, services.replays.close_idle):
+            try:
+                closed += await asyncio.to_thread(close_idle)
+            except Exception:  # the next time is soon
+                logger.exception("sessions that nobody uses could not be closed")
+        if closed_before:  # by now the threads of their views have ended, and hold nothing any more
+            await asyncio.to_thread(give_back)
+        closed_before = closed
         services.preparation.look()  # another program may have imported something
 
 
@@ -156,4 +173,5 @@ def _close(services: Services) -> None:
     services.export_jobs.close()
     services.preparation.close()
     services.snapper.close()
+    services.auth.close()
     services.database.close()

@@ -2,20 +2,32 @@
 
 from urllib.parse import quote
 
-from fastapi import APIRouter, FastAPI, Request
+from fastapi import APIRouter, FastAPI, HTTPException, Request
 from fastapi.responses import FileResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.base import RequestResponseEndpoint
 
-from app.api.dependencies import identify
+from app.api.dependencies import get_services, identify
+from app.api.problems import http_error
 from app.auth import Role
 from app.config import PROJECT
+from app.tables import Base, Object, Registration, Study, Task
 
 STATIC = PROJECT / "static"
 CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; frame-src 'self'; frame-ancestors 'self'; "
     "base-uri 'none'; form-action 'self'"
 )
+
+ABOUT: dict[str, type[Base]] = {
+    "label": Task,
+    "objects": Object,
+    "replay": Registration,
+    "report": Study,
+}
+"""What a page is about that has an id in its address."""
+LARGEST_ID = 2**31 - 1
+NOT_FOR_PEOPLE = ("/api/", "/static/", "/view/")
 
 router = APIRouter(include_in_schema=False)
 
@@ -24,6 +36,7 @@ def install(app: FastAPI) -> None:
     """Serve the pages and their files."""
     app.include_router(router)
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
+    app.add_exception_handler(404, _missing)
     app.middleware("http")(_add_headers)
 
 
@@ -53,10 +66,29 @@ def page(request: Request) -> Response:
     if identity is None:
         wanted = f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path
         return RedirectResponse(f"/sign-in?next={quote(wanted, safe='')}", 303)
-    name = request.url.path.split("/")[1] or "home"
+    name, *about = request.url.path.removeprefix("/").split("/")
     if identity.role is Role.PARTICIPANT and name != "label":
         return RedirectResponse("/participate", 303)
-    return FileResponse(STATIC / f"{name}.html")
+    if about and not _exists(request, name, about[0]):
+        raise HTTPException(404, f"There is nothing at {request.url.path}: no {name} page is about it.")
+    return FileResponse(STATIC / f"{name or 'home'}.html")
+
+
+def _exists(request: Request, name: str, about: str) -> bool:
+    if (name, about) == ("report", "team"):
+        return True
+    if not (about.isascii() and about.isdigit()) or int(about) > LARGEST_ID:
+        return False
+    with get_services(request).database.read() as session:
+        return session.get(ABOUT[name], int(about)) is not None
+
+
+def _missing(request: Request, error: Exception) -> Response:
+    """For a browser a page that leads home, for programs the problem."""
+    asks_for_page = "text/html" in request.headers.get("accept", "")
+    if asks_for_page and not request.url.path.startswith(NOT_FOR_PEOPLE):
+        return FileResponse(STATIC / "missing.html", 404)
+    return http_error(request, error)
 
 
 async def _add_headers(request: Request, call_next: RequestResponseEndpoint) -> Response:

@@ -12,6 +12,7 @@ from app import worker
 from app.database import Database
 from app.scene_data import SceneData
 from app.snapping import Snapper
+from app.storage import DamagedFileError
 from app.symmetries import keep_suggestions, never_looked_into, suggest
 from app.tables import Object
 
@@ -45,7 +46,9 @@ class Preparation:
         self._hashes: dict[Key, str] = {}
         """`ObjectModel.content_hash` of the objects that are prepared."""
         self._problems: dict[Key, str] = {}
-        """Why objects cannot be."""
+        """Why objects cannot be, whenever one tries."""
+        self._damages: dict[Key, str] = {}
+        """Why objects cannot be until their file is mended."""
         self._wanted = threading.Event()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="preparation", daemon=True)
@@ -65,7 +68,7 @@ class Preparation:
 
     def problem(self, item: Object) -> str | None:
         """Why an object cannot be snapped to, in one sentence; None where nothing speaks against it."""
-        return self._problems.get(_key(item))
+        return self._problems.get(_key(item)) or self._damages.get(_key(item))
 
     def close(self) -> None:
         """Take up nothing more. What workers are at ends with the snapper."""
@@ -92,7 +95,7 @@ class Preparation:
         for number, item in enumerate(items):
             if self._closed:
                 return
-            if not self.is_prepared(item) and self.problem(item) is None:
+            if not self.is_prepared(item) and _key(item) not in self._problems:
                 self._prepare(item, number < KNOWN_AHEAD)
         hashes = [self._hashes[key] for key in map(_key, items) if key in self._hashes]
         self._snapper.hand_over(hashes[:KNOWN_AHEAD])  # to workers that came meanwhile
@@ -121,11 +124,14 @@ class Preparation:
                 self._snapper.hand_over([model.content_hash])
         except ValueError as error:
             self._problems[_key(item)] = f"{item.name} cannot be snapped to: {error}."
+        except DamagedFileError as error:
+            self._damages[_key(item)] = f"{item.name} cannot be snapped to: {error}."
         except Exception as error:  # a worker died, or cannot be reached: the next look tries again
             if not self._closed:
                 logger.warning("object %d could not be prepared: %s", item.id, error)
         else:
             self._hashes[_key(item)] = model.content_hash
+            self._damages.pop(_key(item), None)
 
 
 def _key(item: Object) -> Key:

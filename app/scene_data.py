@@ -1,18 +1,23 @@
 """Pictures, depth, point clouds and object models out of the file store, the recent ones kept in memory."""
 
+import logging
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
+import trimesh
 from numpy.typing import NDArray
 
-from app.outline_mesh import thinned
-from app.storage import FileStore
+from app.outline_mesh import drawable, thinned
+from app.recent import Recent
+from app.storage import DamagedFileError, FileStore
 from app.tables import Frame, Object
+from app.textured_mesh import textured_mesh
 from registration_core import Intrinsics, ObjectModel, Symmetries, color_is_aligned, pose
-from registration_core.bop import read_color, read_depth
+from registration_core.bop import BopFormatError, read_color, read_depth
 from registration_core.camera import depth_to_points
 from registration_core.object_model import ContinuousSymmetry
+
+logger = logging.getLogger(__name__)
 
 CLOUD_POINTS = 300_000
 """Most points of a cloud that is shown."""
@@ -20,6 +25,8 @@ PLAIN_COLOR = (160, 165, 172)
 """Of points in a frame without a colour image."""
 KEPT_MODELS = 32
 KEPT_FRAMES = 16
+KEPT_VERDICTS = 100_000
+"""Frames of which it is known whether their colour lies on their depth."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +44,13 @@ class SceneData:
 
     def __init__(self, files: FileStore) -> None:
         self._files = files
-        self._model = lru_cache(KEPT_MODELS)(self._load_model)
-        self._thinned = lru_cache(KEPT_MODELS)(thinned)
-        self._depth = lru_cache(KEPT_FRAMES)(self._load_depth)
-        self._aligned_color = lru_cache(KEPT_FRAMES)(self._load_aligned_color)
+        self._model = Recent(KEPT_MODELS, self._load_model)
+        self._thinned = Recent(KEPT_MODELS, thinned)
+        self._drawable = Recent(KEPT_MODELS, drawable)
+        self._textured = Recent(KEPT_MODELS, self._load_textured)
+        self._depth = Recent(KEPT_FRAMES, self._load_depth)
+        self._color = Recent(KEPT_FRAMES, self._load_color)
+        self._is_aligned = Recent(KEPT_VERDICTS, self._find_aligned)
 
     def model(self, item: Object) -> ObjectModel:
         """The object's mesh, in metres."""
@@ -50,19 +60,31 @@ class SceneData:
         """The same, coarse enough to be drawn many times a second."""
         return self._thinned(self.model(item))
 
+    def drawable(self, model: ObjectModel) -> ObjectModel:
+        """An object's mesh as 3-D views draw it: its own, unless that has too many faces."""
+        return self._drawable(model)
+
+    def textured(self, item: Object) -> trimesh.Trimesh | None:
+        """The object's mesh as 3-D views draw it in its own colours, metres; None where it has none."""
+        return self._textured(item.mesh_hash, item.mesh_format, item.texture_hash)
+
     def depth(self, frame: Frame) -> NDArray[np.float32]:
         """The frame's depth image (H, W), metres, 0 where there is none; not to be written to."""
         return self._depth(frame.depth_hash, frame.depth_scale)
 
     def color(self, frame: Frame) -> NDArray[np.uint8] | None:
-        """The frame's colour image (H, W, 3), where it has one."""
-        return read_color(self._files.path(frame.color_hash)) if frame.color_hash else None
+        """The frame's colour image (H, W, 3), where it has one; not to be written to."""
+        return self._color(frame.color_hash) if frame.color_hash else None
 
     def aligned_color(self, frame: Frame) -> NDArray[np.uint8] | None:
-        """The same where the images show that it lies on the depth, pixel by pixel; not to be written to."""
-        if not frame.color_hash:
+        """The same where the images show that it lies on the depth, pixel by pixel; None where it cannot be
+        read: depth alone will do.
+        """
+        if not frame.color_hash or not self._is_aligned(
+            frame.color_hash, frame.depth_hash, frame.depth_scale
+        ):
             return None
-        return self._aligned_color(frame.color_hash, frame.depth_hash, frame.depth_scale)
+        return self._color(frame.color_hash)
 
     def cloud(self, frame: Frame) -> PointCloud:
         """The frame's measured points in the world, thinned out evenly where there are too many."""
@@ -82,19 +104,35 @@ class SceneData:
     def _load_model(self, digest: str, file_format: str, symmetries: Symmetries) -> ObjectModel:
         return ObjectModel.from_bytes(self._files.read(digest), file_format, "mm", symmetries)
 
+    def _load_textured(
+        self, digest: str, file_format: str, texture_digest: str | None
+    ) -> trimesh.Trimesh | None:
+        try:
+            texture = self._files.read(texture_digest) if texture_digest else None
+        except DamagedFileError as error:
+            logger.warning("an object is shown without its texture: %s", error)
+            return None
+        model = self._model(digest, file_format, Symmetries())
+        return textured_mesh(self._files.read(digest), file_format, texture, model)
+
     def _load_depth(self, digest: str, depth_scale: float) -> NDArray[np.float32]:
         depth = read_depth(self._files.path(digest), depth_scale)
         depth.setflags(write=False)
         return depth
 
-    def _load_aligned_color(
-        self, digest: str, depth_digest: str, depth_scale: float
-    ) -> NDArray[np.uint8] | None:
-        color, depth = read_color(self._files.path(digest)), self._depth(depth_digest, depth_scale)
-        if color.shape[:2] != depth.shape or not color_is_aligned(color, depth):
-            return None
+    def _load_color(self, digest: str) -> NDArray[np.uint8]:
+        color = read_color(self._files.path(digest))
         color.setflags(write=False)
         return color
+
+    def _find_aligned(self, digest: str, depth_digest: str, depth_scale: float) -> bool:
+        depth = self._depth(depth_digest, depth_scale)
+        try:
+            color = self._color(digest)
+        except (BopFormatError, DamagedFileError) as error:
+            logger.warning("a frame is used without its colours: %s", error)
+            return False
+        return color.shape[:2] == depth.shape and color_is_aligned(color, depth)
 
 
 def camera_of(frame: Frame) -> Intrinsics:

@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from app.auth import LOCAL_ADMINISTRATOR, Role
 from app.config import PROJECT, Settings
+from app.connections import server_config
 from app.database import Database
 from app.importing import import_dataset
 from app.listening import ServeError, sign_in_link
@@ -49,13 +50,8 @@ def run(
     if prepare:
         prepare_state(settings, say)
     services = create_services(settings, snapper)
-    config = uvicorn.Config(
-        create_app(services),
-        log_level="warning",
-        access_log=False,
-        ws_max_size=64 * 2**20,
-        ws_per_message_deflate=False,  # point clouds hardly shrink, and everybody would wait for it
-        timeout_graceful_shutdown=SECONDS_TO_FINISH,
+    config = server_config(
+        create_app(services), settings, log_level="warning", timeout_graceful_shutdown=SECONDS_TO_FINISH
     )
     server = _AnnouncingServer(config, lambda: _announce(services, listener, say))
     failures: list[Exception] = []
@@ -68,7 +64,8 @@ def run(
             server.should_exit = True
 
     threading.Thread(target=stop_without_workers, daemon=True).start()
-    server.run(sockets=[listener])
+    with services.database.kept_to_one_server():
+        server.run(sockets=[listener])
     if failures:
         raise ServeError(f"the workers cannot be reached: {failures[0]}")
 

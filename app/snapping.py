@@ -1,5 +1,6 @@
 """Hands snaps and searches to worker processes on Dask, tells how far they are, and cancels them."""
 
+import copy
 import logging
 import threading
 import time
@@ -12,6 +13,7 @@ from typing import Any, TypeVar
 
 import dask
 from distributed import Client, Future, KilledWorker, LocalCluster
+from distributed.security import Security
 
 from app import worker
 from app.clock import BOOT_ID
@@ -28,6 +30,25 @@ DIED = "The worker died while it computed this. Nothing is lost; try again."
 UNREACHABLE = "The workers cannot be reached. Nothing is lost; try again."
 BACKGROUND = -1
 """Priority of what nobody waits for, yet."""
+PATIENCE = 5.0
+"""Seconds in which all workers answer, but for stuck ones; ..."""
+PATIENCE_TO_SEND = 30.0
+"""... and where an object is sent to them."""
+
+CLUSTER_SETTINGS: dict[str, object] = {
+    # A snap that killed its worker once is not tried on the others.
+    "scheduler.allowed-failures": 0,
+    # Workers that were silent while this machine slept are not taken for dead when it wakes up.
+    "scheduler.worker-ttl": None,
+    "scheduler.http.routes": [],
+    "worker.http.routes": [],
+    # What follows watches Dask itself, many times a second in each process, whether or not anybody snaps.
+    "admin.tick.interval": "1s",
+    "admin.system-monitor.interval": "10s",
+    "worker.profile.enabled": False,
+    "scheduler.active-memory-manager.start": False,
+}
+"""Of Dask, under `distributed`, for workers that are started here."""
 
 Result = TypeVar("Result")
 
@@ -156,12 +177,11 @@ class Snapper:
 
     def close(self) -> None:
         """Let workers elsewhere go from whatever they are at, and stop those that were started here."""
-        with self._lock:
-            self._left |= self._pending
-            self._pending.clear()
+        self._leave_all()
         self._objects.close()
         for pool in (self._results, self._calls):
             pool.shutdown(wait=True, cancel_futures=True)
+        self._leave_all()  # what was asked for in between
         if self._client.done() and not self._client.cancelled() and self._client.exception() is None:
             with suppress(OSError):  # the scheduler may be gone already
                 self._stop(list(self._left))
@@ -169,23 +189,14 @@ class Snapper:
         if self._cluster is not None:
             self._cluster.close()
 
+    def _leave_all(self) -> None:
+        with self._lock:
+            self._left |= self._pending
+            self._pending.clear()
+
     def _connect(self) -> Client:
-        # A snap that killed its worker once is not tried on the others; workers that were silent while this
-        # machine slept are not taken for dead when it wakes up.
-        dask.config.set(
-            {"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None}
-        )
         if not self._scheduler_address:
-            self._cluster = LocalCluster(
-                n_workers=self._workers,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                worker_dashboard_address="127.0.0.1:0",
-                memory_limit=0,
-                preload=["app.worker"],
-                silence_logs=logging.CRITICAL,
-            )
+            self._cluster = start_workers(self._workers)
         client = Client(self._cluster or self._scheduler_address, set_as_default=False)
         client.subscribe_topic(self.topic, self._on_report)
         return client
@@ -285,18 +296,18 @@ class Snapper:
             if pending is not None:
                 self._left[snap_id] = pending
         if pending is not None:
-            self._calls.submit(self._stop, [snap_id])
+            with suppress(RuntimeError):  # of a pool that takes no more: closing tells all that are left
+                self._calls.submit(self._stop, [snap_id])
 
     def _stop(self, snap_ids: Sequence[str]) -> None:
-        """Tell the workers of jobs that were left, once."""
-        client = self._client.result()
+        """Tell the workers of jobs that were left."""
         with self._lock:
             left = {one: self._left.pop(one) for one in snap_ids if one in self._left}
         submitted = {
             snap_id: pending.future for snap_id, pending in left.items() if pending.future is not None
         }
         if submitted:
-            client.run(worker.cancel, list(submitted), on_error="ignore")
+            self._ask(worker.cancel, list(submitted))
         for future in submitted.values():
             future.cancel()
 
@@ -320,14 +331,57 @@ class Snapper:
         """Let the workers that do not know an object know it, whatever they are at."""
         addresses = self._lacking([model_hash]).get(model_hash)
         if addresses:
-            client = self._client.result()
-            client.run(worker.keep, model_hash, content, workers=addresses, on_error="ignore")
+            self._ask(worker.keep, model_hash, content, workers=addresses, patience=PATIENCE_TO_SEND)
 
     def _lacking(self, model_hashes: Sequence[str]) -> dict[str, list[str]]:
         """The workers that do not know objects, by object."""
-        told = self._client.result().run(worker.lacking, list(model_hashes), on_error="ignore")
+        told = self._ask(worker.lacking, list(model_hashes))
         by_object = {one: [address for address in told if one in told[address]] for one in model_hashes}
         return {model_hash: addresses for model_hash, addresses in by_object.items() if addresses}
+
+    def _ask(
+        self,
+        function: Callable[..., Any],
+        *args: Any,
+        workers: list[str] | None = None,
+        patience: float | None = None,
+    ) -> dict[str, Any]:
+        """What workers, or all, answer at once, by address. Where one is stuck none counts: nothing that is
+        asked for here must be, since workers ask for what they lack and a result nobody waits for is dropped.
+        """
+        within = PATIENCE if patience is None else patience
+        try:
+            answers: dict[str, Any] = self._client.result().run(
+                function, *args, workers=workers, on_error="ignore", callback_timeout=within
+            )
+        except TimeoutError:
+            logger.warning("not all workers answered within %g s; one may be stuck", within)
+            return {}
+        return answers
+
+
+def start_workers(count: int) -> LocalCluster:
+    """Worker processes on this machine, and a scheduler of theirs, set as `CLUSTER_SETTINGS` say.
+
+    They talk by TLS with certificates that are made here and kept in memory, and show no pages: other
+    accounts of this machine reach their ports as well, and could let them run anything.
+    """
+    # For good, and not for as long as this starts: workers that die are started anew by what is set then.
+    # A copy, for Dask adds pages to the very list that is set, whichever cluster they are of.
+    settings = copy.deepcopy(CLUSTER_SETTINGS)
+    dask.config.set({f"distributed.{key}": value for key, value in settings.items()})
+    return LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        security=Security.temporary(),
+        scheduler_kwargs={"dashboard": False},
+        dashboard_address="127.0.0.1:0",
+        worker_dashboard_address="127.0.0.1:0",
+        memory_limit=0,
+        preload=["app.worker"],
+        silence_logs=logging.CRITICAL,
+    )
 
 
 def create_snapper(settings: Settings) -> Snapper:

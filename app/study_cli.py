@@ -43,8 +43,7 @@ def list_studies() -> None:
         done, total = sum(one.done for one in standings), sum(one.total for one in standings)
         about = f"simulated, {row.state}" if row.is_simulated else row.state
         console.print(
-            f"{row.name} ({about}): {len(standings)} participants, {done} of {total} tasks submitted",
-            markup=False,
+            f"{row.name} ({about}): {len(standings)} participants, {done} of {total} tasks submitted"
         )
 
 
@@ -67,8 +66,7 @@ def simulate_study(
 
         if study is not None:
             console.print(
-                f"Study {name} goes on as it was set up, whatever --operators, --scenes and --seed say.",
-                markup=False,
+                f"Study {name} goes on as it was set up, whatever --operators, --scenes and --seed say."
             )
         else:
             plan = plan_of(database, operators, scenes)
@@ -76,7 +74,7 @@ def simulate_study(
             study = create_simulated(workplace, name, plan, seed, owner.id)
         with _told("simulating") as on_progress:
             simulate(workplace, study.id, on_progress)
-    console.print(f"Study {name}: all simulated operators are done.", markup=False)
+    console.print(f"Study {name}: all simulated operators are done.")
 
 
 @study_cli.command("snap")
@@ -117,8 +115,7 @@ def snap_study(
     took = f" A snap took {seconds:.2g} s (median)." if summary.samples else ""
     console.print(
         f"Study {name}: {summary.samples} sampled poses, {summary.computed} snaps computed,"
-        f" {summary.failed} failed.{took}",
-        markup=False,
+        f" {summary.failed} failed.{took}"
     )
 
 
@@ -141,12 +138,11 @@ def _sampling(
 
 def _print_plan(plan: "Plan", sampling: "Sampling") -> None:
     if plan.chosen < plan.sampled:
-        console.print(f"{plan.chosen} of {plan.sampled} sampled poses are chosen, {sampling}.", markup=False)
+        console.print(f"{plan.chosen} of {plan.sampled} sampled poses are chosen, {sampling}.")
     if plan.seconds >= TOLD_FROM_SECONDS:
         console.print(
             f"{plan.snaps} snaps are to be computed, which will take about {_duration(plan.seconds)}. It may"
-            f" be stopped at any time; the same command goes on.",
-            markup=False,
+            f" be stopped at any time; the same command goes on."
         )
 
 
@@ -191,7 +187,7 @@ def report_study(
     except OSError as error:
         fail(f"cannot write into {out}: {error.strerror}; choose another folder with --out")
     for path in paths:
-        console.print(str(path), markup=False)
+        console.print(str(path))
 
 
 @study_cli.command("erase")
@@ -211,7 +207,7 @@ def erase_participant(
     if participant is None:
         fail(f"the study {name!r} has no participant {code!r}")
     _studies(settings, database).erase(participant.id)
-    console.print(f"All that {code} did and answered is erased.", markup=False)
+    console.print(f"All that {code} did and answered is erased.")
 
 
 @contextmanager
@@ -222,10 +218,10 @@ def _workplace(settings: "Settings", database: "Database") -> "Iterator[Workplac
     snapper = create_snapper(settings)
     try:
         from app.scene_data import SceneData  # such imports take a while, in which the workers start
-        from app.storage import FileStore
+        from app.stored_files import open_store
         from app.study.workplace import Workplace
 
-        yield Workplace(database, SceneData(FileStore(settings.files_dir)), snapper)
+        yield Workplace(database, SceneData(open_store(settings.files_dir, database)), snapper)
     except KeyboardInterrupt:
         fail("stopped; what was done is stored, and the same command goes on from there")
     finally:
@@ -245,10 +241,10 @@ def _told(what: str) -> Iterator[Callable[[int, int], None]]:
 
 def _studies(settings: "Settings", database: "Database") -> "Studies":
     from app.scene_data import SceneData
-    from app.storage import FileStore
+    from app.stored_files import open_store
     from app.study.studies import Studies
 
-    return Studies(database, SceneData(FileStore(settings.files_dir)))
+    return Studies(database, SceneData(open_store(settings.files_dir, database)))
 
 
 def _find(database: "Database", name: str) -> "Study | None":

@@ -23,9 +23,11 @@ from sqlalchemy.orm import (
     DeclarativeBase,
     Mapped,
     column_property,
+    joinedload,
     mapped_column,
     query_expression,
     relationship,
+    undefer,
     with_expression,
 )
 
@@ -40,6 +42,9 @@ FrameUse = Literal["auto", "current"]
 """The frames that a snap uses: those that see the object, or the one that is shown alone."""
 Method = Literal["default", "paper"]
 """What a snap is computed with: the fast default, or the particle filter of the paper."""
+
+Format = Literal["bop", "csv"]
+"""What an export gives: a whole dataset, or its poses alone."""
 
 
 class UtcDateTime(TypeDecorator[datetime]):
@@ -102,6 +107,8 @@ class Dataset(Base):
     name: Mapped[str] = mapped_column(String(200), unique=True)
     risk: Mapped[float | None] = mapped_column(Float)
     """Share of wrong poses among those that the machine may accept; None: as the settings say."""
+    warnings: Mapped[list[Any]] = mapped_column(default=list)
+    """What looked odd when it was imported: `text`, `images` and whether a lead `accepted` it."""
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
     calibration: Mapped["CalibrationRow | None"] = relationship(back_populates="dataset")
 
@@ -137,6 +144,8 @@ class Object(Base):
     name: Mapped[str] = mapped_column(String(200))
     mesh_hash: Mapped[str] = mapped_column(String(64))
     mesh_format: Mapped[str] = mapped_column(String(10))
+    texture_hash: Mapped[str | None] = mapped_column(String(64))
+    """The picture of the mesh's texture, where it has one."""
     model_hash: Mapped[str] = mapped_column(String(64))
     """Of mesh and symmetries as they were imported."""
     diameter: Mapped[float] = mapped_column(Float)
@@ -213,9 +222,7 @@ class Frame(Base):
     scene: Mapped[Scene] = relationship(back_populates="frames")
 
 
-_same = table("tasks", column("scene_id"), column("object_id"), column("mode"), column("condition")).alias(
-    "same"
-)
+_same = table("tasks", column("scene_id"), column("object_id"), column("instance")).alias("same")
 
 
 class Task(Base):
@@ -242,18 +249,21 @@ class Task(Base):
     frame: Mapped[Frame] = relationship()
     registrations: Mapped[list["Registration"]] = relationship(back_populates="task")
     instances: Mapped[int] = column_property(
-        select(func.count())
-        .select_from(_same)
-        .where(
-            _same.c.scene_id == scene_id,
-            _same.c.object_id == object_id,
-            _same.c.mode == mode,
-            _same.c.condition == condition,
-        )
+        select(func.max(_same.c.instance) + 1)
+        .where(_same.c.scene_id == scene_id, _same.c.object_id == object_id)
         .scalar_subquery(),
         deferred=True,
     )
-    """How often the object is asked for in the scene, in this mode and condition; has to be undeferred."""
+    """How often the object is in the scene, as far as tasks of any mode and condition say; has to be
+    undeferred."""
+
+    @property
+    def name(self) -> str:
+        """What people call it everywhere: "mug", or "mug #2" where the object is in the scene several times.
+
+        `object` and `instances` have to be loaded: see `NAMED`.
+        """
+        return f"{self.object.name} #{self.instance + 1}" if self.instances > 1 else self.object.name
 
 
 class Registration(Base):
@@ -273,6 +283,8 @@ class Registration(Base):
     user: Mapped[User] = relationship()
     last_assessment: Mapped[dict[str, Any] | None] = query_expression()
     """That of its newest estimate, where a query asks for it by `LAST_ASSESSMENT`."""
+    ended_by: Mapped[int | None] = query_expression()
+    """Id of the event that ended it last, where a query asks for it by `ENDED_BY`."""
 
 
 class Event(Base):
@@ -346,10 +358,14 @@ class Export(Base):
     __tablename__ = "exports"
     id: Mapped[int] = mapped_column(primary_key=True)
     dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"))
-    format: Mapped[str] = mapped_column(String(20))
+    format: Mapped[Format] = mapped_column(String(20))
     state: Mapped[str] = mapped_column(String(20), default="queued")
     progress: Mapped[float] = mapped_column(Float, default=0.0)
     message: Mapped[str] = mapped_column(String(2000), default="")
+    choice: Mapped[dict[str, Any]] = mapped_column(default=lambda: {"scene_ids": None, "without": []})
+    """The part that is exported: rows of `scenes`, or null for all, and registrations that are left out."""
+    failures: Mapped[list[Any]] = mapped_column(default=list)
+    """Objects that did not pass the gate, as `app.export.job.told_failures` tells of them."""
     file_hash: Mapped[str | None] = mapped_column(String(64))
     user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))
     created_at: Mapped[datetime] = mapped_column(default=utc_now)
@@ -445,6 +461,9 @@ class OfflineSnap(Base):
     hardware: Mapped[str] = mapped_column(String(200))
 
 
+NAMED = (joinedload(Task.object), undefer(Task.instances))
+"""Options of queries for tasks: what `Task.name` needs."""
+
 LAST_ASSESSMENT = with_expression(
     Registration.last_assessment,
     select(EstimateRow.assessment)
@@ -454,6 +473,14 @@ LAST_ASSESSMENT = with_expression(
     .scalar_subquery(),
 )
 """An option of queries for registrations: what was thought of the machine's last estimate of each."""
+
+ENDED_BY = with_expression(
+    Registration.ended_by,
+    select(func.max(Event.id))
+    .where(Event.registration_id == Registration.id, Event.kind.in_(("submit", "skip")))
+    .scalar_subquery(),
+)
+"""An option of queries for registrations: which of them is newer, whatever the clock was set to meanwhile."""
 
 OUTSIDE_STUDIES = Registration.user_id.not_in(select(Participant.user_id))
 """Registrations of the ordinary work, which what participants of studies do never mixes with."""

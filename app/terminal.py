@@ -1,5 +1,7 @@
 """What all commands share: the terminal, the settings and the database. Heavy imports stay inside."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn
 
 from rich.console import Console
@@ -9,8 +11,8 @@ if TYPE_CHECKING:
     from app.config import Settings
     from app.database import Database
 
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+console = Console(highlight=False, soft_wrap=True, markup=False)  # names may look like markup
+errors = Console(stderr=True, highlight=False, soft_wrap=True, markup=False)
 
 
 def read_settings(**given: object) -> "Settings":
@@ -42,13 +44,21 @@ def checked_database(settings: "Settings") -> "Database":
     return database
 
 
+@contextmanager
+def progress(what: str) -> Iterator[Callable[[float, str], None]]:
+    """A bar that fills as it is told the share that is done and what is done now."""
+    with progress_bar() as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share, now: bar.update(task, completed=share, description=now)
+
+
 def progress_bar() -> Progress:
     """A bar on the terminal; nothing where there is none."""
-    columns = (TextColumn("{task.description}"), BarColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn())
     return Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal)
 
 
 def fail(message: str) -> NoReturn:
     """End with one sentence."""
-    errors.print(f"snap6d: {message}", markup=False)
+    errors.print(f"snap6d: {message}")
     raise SystemExit(1)

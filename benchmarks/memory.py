@@ -16,6 +16,8 @@ from benchmarks.server import RunningServer, prepare_state, running_server
 
 TITLE = "Memory (resident) with open sessions of 300,000 points, each on a frame of its own"
 TARGET = Target(700.0)
+FOLDER = "snap6d-view-"
+"""Where the socket file of a view lies."""
 IMPATIENT = (sys.executable, "-m", "benchmarks.impatient_server", "serve")
 SECONDS_TO_SETTLE = 3.0
 SECONDS_TO_CLOSE = 30.0
@@ -38,47 +40,53 @@ def run(folder: Path, quick: bool) -> list[Figure]:
 async def _measure(server: RunningServer, counts: tuple[int, ...], settle: float) -> list[Figure]:
     figures = _figures(server, "no session yet")
     tasks = known_tasks(server.state_dir)
-    listening = _listening(server)
     async with signed_in_operators(server, counts[-1]) as operators:
         async with AsyncExitStack() as pages:
             for number, (operator, task) in enumerate(zip(operators, tasks, strict=True), start=1):
-                await _open_page(pages, operator, task.id)
+                await open_page(pages, operator, task.id)
                 if number in counts:
                     await asyncio.sleep(settle)
                     target = TARGET if number == 20 else None
                     figures += _figures(server, f"{number} session{'s' * (number > 1)}", target)
-        await _wait_until_closed(server, listening)
+        assert open_views(server) == counts[-1]
+        await wait_until_closed(server)
     await asyncio.sleep(settle)
     return figures + _figures(server, "after all were closed")
 
 
-async def _open_page(pages: AsyncExitStack, operator: Operator, task_id: int) -> None:
+async def open_page(pages: AsyncExitStack, operator: Operator, task_id: int) -> None:
+    """Take up a task with its stream and its 3-D view, until `pages` end."""
     registration_id = await operator.start(task_id)
     await pages.enter_async_context(operator.stream(registration_id))
     await pages.enter_async_context(operator.view(registration_id))
 
 
-async def _wait_until_closed(server: RunningServer, listening: int) -> None:
+async def wait_until_closed(server: RunningServer) -> None:
+    """Return when no session has a 3-D view any more.
+
+    Raises:
+        SessionsStayError: where some are kept.
+    """
     deadline = time.perf_counter() + IDLE_SECONDS + SECONDS_TO_CLOSE
-    while _listening(server) > listening:
+    while (still_open := open_views(server)) > 0:
         if time.perf_counter() > deadline:
-            raise SessionsStayError(f"{_listening(server) - listening} sessions were not closed")
+            raise SessionsStayError(f"{still_open} sessions were not closed")
         await asyncio.sleep(0.2)
 
 
-def _listening(server: RunningServer) -> int:
-    """How many ports the application listens on: each open view has one."""
-    connections = server.process.net_connections("tcp")
-    return sum(connection.status == psutil.CONN_LISTEN for connection in connections)
+def open_views(server: RunningServer) -> int:
+    """How many socket files the application serves 3-D views on."""
+    return len({one.laddr for one in server.process.net_connections("unix") if FOLDER in str(one.laddr)})
 
 
 def _figures(server: RunningServer, when: str, target: Target | None = None) -> list[Figure]:
-    workers = [_megabytes(worker) for worker in server.worker_processes()]
+    workers = [megabytes(worker) for worker in server.worker_processes()]
     return [
-        Figure(f"{when}: application", _megabytes(server.process), "MB", target),
+        Figure(f"{when}: application", megabytes(server.process), "MB", target),
         Figure(f"{when}: each of {len(workers)} workers, largest", max(workers), "MB"),
     ]
 
 
-def _megabytes(process: psutil.Process) -> float:
+def megabytes(process: psutil.Process) -> float:
+    """What of a process is in memory."""
     return process.memory_info().rss / 1e6

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from registration_core import pose
 from registration_core.estimate import Ambiguity
 from registration_core.kernels import from_rows
-from registration_core.polish import MEASURED_NOISE
+from registration_core.polish import scaled_covariances
 from registration_core.selection import scores
 from registration_core.snap_config import SelectionConfig
 from registration_core.viewpoint_model import ViewpointModel
@@ -71,9 +71,7 @@ def _free_motions(
     config: SelectionConfig,
 ) -> list[Ambiguity]:
     """Principal motions that the polish does not hold and that the evidence does not notice either."""
-    variances, motions = np.linalg.eigh(
-        np.linalg.inv(hessian / MEASURED_NOISE**2 + np.eye(6) / model.radius**2)
-    )
+    variances, motions = np.linalg.eigh(scaled_covariances(hessian, model.radius))
     found = []
     for variance, motion in zip(variances[::-1], motions.T[::-1], strict=True):
         if np.sqrt(variance) < UNHELD * model.diameter:

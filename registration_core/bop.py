@@ -1,7 +1,8 @@
 """BOP datasets: read and checked as a whole. Millimetres and `cam_R_m2c` end in the modules named `bop`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.bop_fields import BopFormatError, Entry, name_of, optional_json, read_json, shortened
-from registration_core.bop_images import decoded, decoded_depth, find_color, read_color, read_depth
+from registration_core.bop_images import (
+    ImageFile,
+    SceneFolders,
+    examined_color,
+    examined_depth,
+    read_color,
+    read_depth,
+)
+from registration_core.bop_layout import find_scene_folders
 from registration_core.bop_models import BopObject, find_meshes, read_objects
 from registration_core.camera import Intrinsics
 
@@ -43,8 +52,8 @@ class BopImage:
     """A depth image with its camera, and colour where there is any."""
 
     image_id: int
-    color_path: Path | None
-    depth_path: Path
+    color: ImageFile | None
+    depth: ImageFile
     depth_scale: float
     """Raw depth times this is millimetres."""
     camera: Intrinsics
@@ -94,6 +103,15 @@ def read_dataset(root: Path, progress: Progress | None = None) -> BopDataset:
     return BopDataset(root.resolve().name, objects, tuple(scenes))
 
 
+def with_depth_scale(dataset: BopDataset, depth_scale: float) -> BopDataset:
+    """The dataset as if every image had this scale: raw depth times it is millimetres."""
+    scenes = [
+        replace(scene, images=tuple(replace(image, depth_scale=depth_scale) for image in scene.images))
+        for scene in dataset.scenes
+    ]
+    return replace(dataset, scenes=tuple(scenes))
+
+
 class StepCounter:
     """Turns steps of equal weight into calls of a progress function."""
 
@@ -109,20 +127,6 @@ class StepCounter:
             self._progress(self._done / self._steps, what)
 
 
-def find_scene_folders(root: Path) -> list[Path]:
-    """The numbered folders of every split, in order."""
-    splits = sorted(child for child in root.iterdir() if child.is_dir())
-    folders = [
-        scene
-        for split in splits
-        for scene in sorted(split.iterdir(), key=lambda path: path.name)
-        if scene.is_dir() and scene.name.isdigit()
-    ]
-    if not folders:
-        raise BopFormatError(f"{root.name} has no scene; put scenes into numbered folders, as test/000001")
-    return folders
-
-
 def read_scene(
     root: Path, folder: Path, cameras: dict[int, Any], known: set[int], report: StepCounter
 ) -> BopScene:
@@ -135,14 +139,23 @@ def read_scene(
         raise BopFormatError(
             f"{name}/scene_gt.json: image {image_id} is not in scene_camera.json; add it there"
         )
-    images = []
-    for image_id, content in sorted(cameras.items()):
+    files = SceneFolders(folder, name)
+
+    def read(image_id: int) -> BopImage:
         truth = None
         if image_id in truths:
             truth = read_ground_truth(truths[image_id], f"{name}/scene_gt.json: image {image_id}", known)
-        entry = Entry.of(content, f"{name}/scene_camera.json: image {image_id}")
-        images.append(read_image(root, folder, image_id, entry, truth))
-        report.done(f"{name}, image {image_id}")
+        entry = Entry.of(cameras[image_id], f"{name}/scene_camera.json: image {image_id}")
+        return read_image(name, files, image_id, entry, truth)
+
+    images = []
+    pool = ThreadPoolExecutor()  # decoding, which takes the time, lets other threads run
+    try:
+        for image in pool.map(read, sorted(cameras)):
+            images.append(image)
+            report.done(f"{name}, image {image.image_id}")
+    finally:
+        pool.shutdown(cancel_futures=True)
     return BopScene(int(folder.name), folder.parent.name, tuple(images))
 
 
@@ -163,29 +176,29 @@ def read_ground_truth(content: object, where: str, known: set[int]) -> tuple[Bop
 
 
 def read_image(
-    root: Path, folder: Path, image_id: int, entry: Entry, truth: tuple[BopGroundTruth, ...] | None
+    scene: str, files: SceneFolders, image_id: int, entry: Entry, truth: tuple[BopGroundTruth, ...] | None
 ) -> BopImage:
-    """One image: both files are decoded and must have the same size."""
+    """One image: both files are decoded and must have the same size; `scene` names it in messages."""
     depth_scale = entry.positive("depth_scale", "raw depth times it is millimetres")
     K = entry.numbers("cam_K", 9)
-    depth_path = folder / "depth" / f"{image_id:06d}.png"
-    if not depth_path.is_file():
+    depth_path = files.depth(image_id)
+    if depth_path is None:
         raise BopFormatError(
-            f"{name_of(depth_path, root)} is missing though scene_camera.json names image {image_id};"
+            f"{scene}/depth/{image_id:06d}.png is missing though scene_camera.json names image {image_id};"
             " add the file"
         )
-    width, height = decoded_depth(depth_path, name_of(depth_path, root)).size
-    color_path = find_color(folder, image_id)
+    depth = examined_depth(depth_path, f"{scene}/depth/{depth_path.name}")
+    color_path, color = files.color(image_id), None
     if color_path is not None:
-        color_name = name_of(color_path, root)
-        size = decoded(color_path, color_name).size
-        if size != (width, height):
+        color_name = f"{scene}/{color_path.parent.name}/{color_path.name}"
+        color = examined_color(color_path, color_name, (depth.width, depth.height))
+        if (color.width, color.height) != (depth.width, depth.height):
             raise BopFormatError(
-                f"{color_name} is {size[0]}x{size[1]} pixels but its depth image is {width}x{height};"
-                " both must have one size"
+                f"{color_name} is {color.width}x{color.height} pixels but its depth image is"
+                f" {depth.width}x{depth.height}; both must have one size"
             )
     try:
-        camera = Intrinsics.from_matrix(K, width, height)
+        camera = Intrinsics.from_matrix(K, depth.width, depth.height)
     except ValueError as error:
         raise BopFormatError(f"{entry.where}: cam_K: {error}") from error
-    return BopImage(image_id, color_path, depth_path, depth_scale, camera, entry.camera_pose(), truth)
+    return BopImage(image_id, color, depth, depth_scale, camera, entry.camera_pose(), truth)

@@ -1,7 +1,9 @@
 """Fields of BOP's JSON files, checked one by one: what is wrong is said with file, field and value."""
 
 import json
+from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,10 @@ LARGEST_NUMBER = 1e300
 """What lies beyond is as good as infinite."""
 
 LONGEST_ID = 9
-"""Digits of an image's or an object's id."""
+"""Digits of the id of a scene, an image or an object: what 32 bits hold."""
+
+LONGEST_NAME = 200
+"""Characters of the name of an object or a dataset."""
 
 SMALLEST_DISTANCE = 10.0
 """Millimetres; an object nearer to the camera's centre than that was written in metres."""
@@ -156,24 +161,40 @@ class Entry:
 
 def read_json(path: Path, name: str) -> dict[int, Any]:
     """A JSON file that maps numbers (image or object ids) to values; `name` stands for it in messages."""
+    if not path.exists():
+        raise BopFormatError(f"{name} is missing; add it")
+    if not path.is_file():  # a pipe would be waited for
+        raise BopFormatError(f"{name} is no file; put a JSON file in its place")
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise BopFormatError(f"{name} is missing; add it") from error
+        content = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=partial(_fields, name))
     except json.JSONDecodeError as error:
         raise BopFormatError(
             f"{name} is no valid JSON: {error.msg} at line {error.lineno}, column {error.colno};"
             " write it again"
         ) from error
+    except BopFormatError:
+        raise
     except (OSError, ValueError, RecursionError) as error:  # no UTF-8, endless numbers, endless nesting
         raise BopFormatError(f"{name} cannot be read as JSON text; check the file") from error
-    entry = Entry.of(content, name)
-    for key in entry.values:
-        if not (key.isascii() and key.isdigit() and len(key) <= LONGEST_ID):
+    values: dict[int, Any] = {}
+    for key, value in Entry.of(content, name).values.items():
+        if not is_id(key):
             raise BopFormatError(
                 f"{name}: keys must be whole numbers of at most {LONGEST_ID} digits; there is {key[:20]!r}"
             )
-    return {int(key): value for key, value in entry.values.items()}
+        if int(key) in values:
+            raise BopFormatError(f"{name} has number {int(key)} twice; keep one of the two")
+        values[int(key)] = value
+    return values
+
+
+def _fields(name: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object's fields, none of which may be there twice: of two, one would be lost."""
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        twice = next(key for key, count in Counter(key for key, _ in pairs).items() if count > 1)
+        raise BopFormatError(f"{name} has {shortened(twice)} twice in one object; keep one of the two")
+    return fields
 
 
 def optional_json(path: Path, root: Path) -> dict[int, Any]:
@@ -184,6 +205,16 @@ def optional_json(path: Path, root: Path) -> dict[int, Any]:
 def name_of(path: Path, root: Path) -> str:
     """A path for a message: inside the dataset."""
     return path.relative_to(root).as_posix()
+
+
+def is_id(text: str) -> bool:
+    """Whether a file's, folder's or key's name is the number of something."""
+    return text.isascii() and text.isdigit() and len(text) <= LONGEST_ID
+
+
+def is_name(text: str, longest: int = LONGEST_NAME) -> bool:
+    """Whether a text can be shown, written to any database, and made a file's name."""
+    return 0 < len(text) <= longest and text.isprintable() and not text.isspace()
 
 
 def check_rotation(R: Array, name: str) -> None:

@@ -12,13 +12,12 @@ from PIL import Image
 
 from registration_core import pose
 from registration_core.bop_fields import METRES_PER_MILLIMETRE
+from registration_core.bop_images import LARGEST_RAW_DEPTH
 from registration_core.camera import Intrinsics
+from registration_core.mesh_file import plain_ply
 from registration_core.object_model import ObjectModel
 
 Array = NDArray[np.float64]
-
-LARGEST_RAW_DEPTH = 65535
-"""What 16 bits hold."""
 
 
 def camera_file(camera: Intrinsics, depth_scale: float) -> dict[str, Any]:
@@ -108,11 +107,11 @@ def write_image(path: Path, image: Image.Image) -> None:
 
 
 def write_mesh(path: Path, mesh: trimesh.Trimesh) -> None:
-    """Write a mesh given in metres as a binary PLY in mm, with its vertex colours."""
+    """Write a mesh given in metres as PLY in mm, with its vertex colours."""
     scaled = mesh.copy()
     scaled.apply_scale(1.0 / METRES_PER_MILLIMETRE)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(scaled.export(file_type="ply"))
+    path.write_bytes(plain_ply(scaled))
 
 
 def millimetres(metres: Array) -> list[float]:

@@ -17,12 +17,13 @@ Array = NDArray[np.float64]
 
 FEATURES = (
     *("intercept", "belief", "score", "match", "inner match", "shown"),
-    *("contrast", "color", "color change"),
+    *("contrast", "color", "color change", "precision"),
 )
 """What speaks for a winner: 1, the logit of the share of the belief that lies within EXACT of it, its score
 in log-odds, the share of its claim that was measured where it is claimed, the same away from rims, the share
-that is not hidden, the share of its outline where the surface ends, 1 where its outline was seen in colour,
-and the share of that where the colour changes.
+that is not hidden, the share of its outline where the surface ends, how much of its outline was seen in
+colour, in LEAST_COLORED and at most 1, the share of that where the colour changes, and how many times smaller
+than EXACT the spread of its surface is, as a logarithm.
 """
 EXACT = 0.05
 """MSSD below which a pose is right, share of the diameter."""
@@ -35,7 +36,7 @@ LEAST_INNER = 0.1
 LEAST_RING = 0.1
 """The same for what was seen just outside the outline."""
 LEAST_COLORED = 0.02
-"""The same for what was seen of the outline's colours: less says nothing."""
+"""The same for what was seen of the outline's colours: the less there is, the less it says."""
 LIKE_WEIGHT = 0.02
 """Modes with less than this share of the winner's mass are not compared with it."""
 SAME_SURFACE = 0.03
@@ -127,9 +128,9 @@ def _astray(poses: Array32, others: NDArray[np.intp], points: Array32, model: Vi
     return np.mean(apart.reshape(len(others), -1) > SAME_SURFACE * model.diameter, axis=1)
 
 
-def features(beliefs: Array, scores: Array, counts: Array) -> Array:
-    """The FEATURES (N, F) of winners with shares of the belief near them (N,), scores (N,) and counts
-    (N, COUNT).
+def features(beliefs: Array, scores: Array, counts: Array, spreads: Array) -> Array:
+    """The FEATURES (N, F) of winners with shares of the belief near them (N,), scores (N,), counts (N, COUNT)
+    and spreads (N,).
     """
     inner = counts[:, : evidence.INSIDE_BINS]
     matched = inner[:, evidence.MATCHED] + inner[:, evidence.MATCHED_ON_PLANE]
@@ -138,7 +139,6 @@ def features(beliefs: Array, scores: Array, counts: Array) -> Array:
     ends = rings[:, list(evidence.ENDS)].sum(axis=1)
     changes = counts[:, evidence.COLOR_CHANGES]
     outline = changes + counts[:, evidence.COLOR_STEADY]
-    colored = outline >= LEAST_COLORED
     return np.stack(
         [
             np.ones(len(counts)),
@@ -148,20 +148,22 @@ def features(beliefs: Array, scores: Array, counts: Array) -> Array:
             matched / np.maximum(visible, LEAST_INNER),
             shown_shares(counts),
             ends / np.maximum(rings.sum(axis=1), LEAST_RING),
-            colored,
-            np.where(colored, changes / np.maximum(outline, LEAST_COLORED), 0.0),
+            np.minimum(outline / LEAST_COLORED, 1.0),
+            changes / np.maximum(outline, LEAST_COLORED),
+            np.log(EXACT / spreads),
         ],
         axis=1,
     )
 
 
-def confidence(belief: float, score: float, counts: Array, config: ConfidenceConfig) -> float:
+def confidence(belief: float, score: float, counts: Array, spread: float, config: ConfidenceConfig) -> float:
     """Probability in [0, 1] that the MSSD is below 5 % of the diameter.
 
     Args:
         belief: share of the belief near the winner, as `belief_in_first` gives it.
         score: log-odds of the winner, as `selection.scores` gives them.
         counts: (evidence.COUNT,), of the winner.
+        spread: of its surface, as `precision.surface_spreads` gives it.
     """
-    speaks = features(np.array([belief]), np.array([score]), counts[None])[0]
+    speaks = features(np.array([belief]), np.array([score]), counts[None], np.array([spread]))[0]
     return float(expit(speaks @ np.array(config.weights)))

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from registration_core.color_edges import BORDER
 from registration_core.kernels import EXACT, Array32
 from registration_core.observation import NEAREST, Grid
 from registration_core.rasterizer import draw_mesh
@@ -252,7 +253,7 @@ def _ring_bin(seen, behind, on_plane, known):
 @njit(**EXACT)
 def _count_colors(crop, depth, known, changes, rows, first_row, first_column, sharpness, count):
     """Count the edges of the visible outline by whether the colour changes across them, in the image that the
-    grid's `rows` without its border were reduced from.
+    grid's `rows` without its border were reduced from; not those too near to its border to be looked up.
     """
     block = changes.shape[0] // rows
     for r in range(crop.shape[0]):
@@ -265,14 +266,15 @@ def _count_colors(crop, depth, known, changes, rows, first_row, first_column, sh
                 i, j = r + down, c + right
                 if 0 <= i < crop.shape[0] and 0 <= j < crop.shape[1] and crop[i, j] == 0.0:
                     row, column = (first_row + r - 1) * block, (first_column + c - 1) * block
-                    changed = _changes_across(changes, row, column, block, down, right)
-                    count[COLOR_CHANGES if changed else COLOR_STEADY] += 1
+                    kind = _color_across(changes, row, column, block, down, right)
+                    if kind >= 0:
+                        count[kind] += 1
 
 
 @njit(**EXACT, inline="always")
-def _changes_across(changes, row, column, block, down, right):
-    """Whether the colour changes on the line from the block of pixels at (row, column) to the next one, as
-    far from the edge between them as the outline may be off: half a block, or a pixel.
+def _color_across(changes, row, column, block, down, right):
+    """The class of the line from the block of pixels at (row, column) to the next one, as far from the edge
+    between them as the outline may be off: half a block, or a pixel. -1 where it leaves what is known.
     """
     reach = max(1, block // 2)
     i, j = row + block // 2, column + block // 2
@@ -280,8 +282,10 @@ def _changes_across(changes, row, column, block, down, right):
         i = (row + block if down > 0 else row) - reach
     else:
         j = (column + block if right > 0 else column) - reach
-    for _ in range(2 * reach):
-        if 0 <= i < changes.shape[0] and 0 <= j < changes.shape[1] and changes[i, j]:
-            return True
-        i, j = i + abs(down), j + abs(right)
-    return False
+    last_i, last_j = i + abs(down) * (2 * reach - 1), j + abs(right) * (2 * reach - 1)
+    if i < BORDER or j < BORDER or last_i >= changes.shape[0] - BORDER or last_j >= changes.shape[1] - BORDER:
+        return -1
+    for k in range(2 * reach):
+        if changes[i + k * abs(down), j + k * abs(right)]:
+            return COLOR_CHANGES
+    return COLOR_STEADY

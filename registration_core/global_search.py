@@ -72,7 +72,7 @@ def propose(
     found, agreement = ranked(poses, search.weighed(poses), config.anywhere.kept)
     for stage in config.anywhere.stages:
         found, agreement = search.refined(found, agreement, stage)
-    return found_anywhere(problem, found, search.evidence(found), MOST)
+    return found_anywhere(search, found, MOST)
 
 
 def checked_region(region: Sequence[int] | None, camera: Intrinsics) -> tuple[int, int, int, int]:

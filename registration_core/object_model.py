@@ -1,8 +1,6 @@
 """A known object: its mesh in metres, its diameter and its symmetries."""
 
 import hashlib
-import io
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +11,8 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 from scipy.spatial.transform import Rotation
+
+from registration_core.mesh_file import read_mesh
 
 Array = NDArray[np.float64]
 
@@ -153,26 +153,6 @@ class ObjectModel:
     def symmetry_transforms(self) -> Array:
         """`symmetries.transforms` (S, 4, 4) for this diameter, identity first."""
         return self.symmetries.transforms(self.diameter)
-
-
-_reading = threading.Lock()
-"""One at a time: numpy parses a PLY file's types as Python, and CPython 3.11 fails where two threads do."""
-
-
-def read_mesh(content: bytes, file_type: str) -> trimesh.Trimesh:
-    """The triangle mesh in a file's content, with its colours, vertices neither merged nor reordered.
-
-    Raises:
-        ValueError: where trimesh cannot read it as one mesh.
-    """
-    try:
-        with _reading:
-            mesh = trimesh.load(io.BytesIO(content), file_type=file_type, force="mesh", process=False)
-    except Exception as error:  # trimesh's readers raise whatever they meet
-        raise ValueError(f"mesh cannot be read as {file_type}: {error}") from error
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise ValueError("mesh must have vertices and faces; it is empty")
-    return mesh
 
 
 def discrete(transforms: Sequence[Array]) -> Symmetries:

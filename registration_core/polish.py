@@ -100,13 +100,21 @@ def eased(
     return drawn
 
 
+def scaled_covariances(hessians: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+    """The inverse of Hessians (..., 6, 6) of `systems`, in their scale, by the variance MEASURED_NOISE^2. A
+    direction that nothing holds gets the standard deviation of the object's radius [m].
+    """
+    information = hessians / MEASURED_NOISE**2 + np.eye(6) / radius**2
+    return np.asarray(np.linalg.inv(information), dtype=np.float64)
+
+
 def covariance(
     hessian: NDArray[np.float64], rotation: NDArray[np.float64], radius: float, centre: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Covariance (6, 6) of a pose, order (translation [m], rotation vector [rad]), of the object's origin.
 
-    The inverse of the Hessian (6, 6) of `systems` at the pose, scaled by the variance MEASURED_NOISE^2. A
-    direction that nothing holds gets the standard deviation of the object's radius, or one radian.
+    `scaled_covariances` of the Hessian (6, 6) of `systems` at the pose: a turn that nothing holds gets the
+    standard deviation of one radian.
 
     Args:
         rotation: (3, 3), of the pose.
@@ -114,8 +122,7 @@ def covariance(
         centre: (3,), metres, in the mesh frame: what `systems` turns about.
     """
     scale = np.repeat([1.0, 1.0 / radius], 3)
-    information = hessian / MEASURED_NOISE**2 + np.eye(6) / radius**2
-    at_centre = np.linalg.inv(information) * np.outer(scale, scale)
+    at_centre = scaled_covariances(hessian, radius) * np.outer(scale, scale)
     x, y, z = rotation @ centre
     # t_origin = t_centre - R centre, and a small turn w moves R centre by w x (R centre)
     jacobian = np.eye(6)

@@ -9,6 +9,10 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 
 
+FARTHEST = 1e8
+"""Metres; what is computed from a pose farther away overflows."""
+
+
 class PoseDistance(NamedTuple):
     """How far two poses are apart."""
 
@@ -24,6 +28,11 @@ def from_rotation_translation(rotation: ArrayLike, translation: ArrayLike) -> Ar
     T[:3, :3] = rotation
     T[:3, 3] = translation
     return T
+
+
+def is_within_reach(T: Array) -> bool:
+    """Whether something at this pose (4, 4) is where anything can be computed of it."""
+    return bool(np.abs(T).max() <= FARTHEST)  # false for NaN as well
 
 
 def inverse(T: Array) -> Array:

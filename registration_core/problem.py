@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -86,14 +87,48 @@ def checked_problem(
         ValueError: naming the argument that is wrong, and how.
     """
     T = pose.checked(T_camera_object, "T_camera_object")
+    return problem_of(model, checked_view(depth, camera, explained, color), T, config, start_spread)
+
+
+class CheckedView(NamedTuple):
+    """A view whose images are what they should be."""
+
+    depth: NDArray[np.float32]
+    camera: Intrinsics
+    explained: NDArray[np.bool_] | None
+    color: NDArray[np.uint8] | None
+
+
+def checked_view(
+    depth: ArrayLike, camera: Intrinsics, explained: ArrayLike | None, color: ArrayLike | None
+) -> CheckedView:
+    """The images of one view; raises a ValueError that says which is wrong, and how."""
     image = checked_depth(depth, camera)
-    viewpoints = viewpoint_model(model)
-    start = centred(T, viewpoints.centre)
-    check_in_view(viewpoints, camera, start)
-    prior, search = _priors(start, config.spread, start_spread)
     mask = None if explained is None else checked_mask(explained, camera)
-    colors = None if color is None else checked_color(color, camera)
-    return Problem(viewpoints, image, camera, T, start, prior, search, config, mask, colors)
+    return CheckedView(image, camera, mask, None if color is None else checked_color(color, image.shape))
+
+
+def problem_of(
+    model: Registrable,
+    view: CheckedView,
+    T_camera_object: Array,
+    config: SnapConfig,
+    start_spread: tuple[float, float] | None,
+) -> Problem:
+    """What is to be done in a view from a rigid pose (4, 4).
+
+    Raises:
+        OutOfViewError: where no part of the object can be in the image.
+        ValueError: where `start_spread` is none.
+    """
+    viewpoints = viewpoint_model(model)
+    start = centred(T_camera_object, viewpoints.centre)
+    check_in_view(viewpoints, view.camera, start)
+    prior, search = _priors(start, config.spread, start_spread)
+    return Problem(
+        viewpoints, view.depth, view.camera, T_camera_object, start, prior, search, config,
+        view.explained, view.color,
+    )  # fmt: skip
 
 
 def region_of_interest(

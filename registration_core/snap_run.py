@@ -18,6 +18,7 @@ from registration_core.certificates import Check, checked_by
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct, move_to_nearest_twin
 from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
+from registration_core.precision import surface_spreads
 from registration_core.problem import Problem
 from registration_core.search import Search
 from registration_core.selection import Judgement
@@ -140,6 +141,10 @@ class SnapRun:
     def hessian(self, T: Array32) -> Array:
         """How firmly the depth of all views holds a pose (3, 4): (6, 6), as `polish.systems` scales it."""
         return self._systems(T[None], FINAL_TUKEY)[0][0]
+
+    def spreads(self, poses: Array32) -> Array:
+        """How far the surface at poses (N, 3, 4) may lie off, as `surface_spreads` gives it."""
+        return surface_spreads(poses, self._systems(poses, FINAL_TUKEY)[0], self.problem.model)
 
     def _systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
         parts = [sighting.systems(poses, tukey) for sighting in self.sightings]

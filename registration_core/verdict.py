@@ -13,8 +13,9 @@ from registration_core.confidence import Modes, belief_in_first, confidence, gro
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
 from registration_core.kernels import Array32, from_rows, to_rows
 from registration_core.modes import distinct
-from registration_core.polish import covariance, eased
-from registration_core.problem import Problem
+from registration_core.polish import FINAL_TUKEY, covariance, eased
+from registration_core.precision import surface_spreads
+from registration_core.search import Search
 from registration_core.selection import Judgement, match_shares, scores
 from registration_core.snap_run import SnapRun
 
@@ -50,7 +51,8 @@ def standing(run: SnapRun, candidates: Array32, counts: Array) -> Standing:
     log_odds = judgement.scores / config.temperature
     modes = grouped(candidates, judgement.winner, log_odds, run.problem.model, config)
     belief = belief_in_first(modes, candidates[modes.best], run.problem.model)
-    return Standing(candidates, judgement, modes, confidence(belief, *judgement.of_winner, config))
+    spread = float(run.spreads(candidates[[judgement.winner]])[0])
+    return Standing(candidates, judgement, modes, confidence(belief, *judgement.of_winner, spread, config))
 
 
 def progress(run: SnapRun, iteration: int, iterations: int, poses: Array32, sure: float) -> SnapStep:
@@ -81,15 +83,16 @@ def outcome(run: SnapRun, iteration: int, particles: Array32, log_weights: Array
     log_odds = np.exp(log_weights[kept]) / PARTICLE_TEMPERATURE
     modes = grouped(particles[kept], 0, log_odds, model, config)
     poses = particles[kept[modes.best]]
-    score, counts = judged(run, particles[0])
-    sure = confidence(belief_in_first(modes, poses, model), score, counts, config)
+    score, counts, spread = judged(run, particles[0])
+    sure = confidence(belief_in_first(modes, poses, model), score, counts, spread, config)
     return _conclusion(run, iteration, poses, modes.masses, sure, counts)
 
 
-def judged(run: SnapRun, T: Array32) -> tuple[float, Array]:
-    """Score and counts (COUNT,) of a pose (3, 4)."""
+def judged(run: SnapRun, T: Array32) -> tuple[float, Array, float]:
+    """Score, counts (COUNT,) and spread of a pose (3, 4)."""
     counts, tails = run.evidence(T[None]), heavy_tails(T[None], run.problem.prior)
-    return float(scores(counts, tails, run.problem.config.selection)[0]), counts[0]
+    score = float(scores(counts, tails, run.problem.config.selection)[0])
+    return score, counts[0], float(run.spreads(T[None])[0])
 
 
 def nothing_seen(run: SnapRun, iteration: int) -> SnapStep:
@@ -98,11 +101,11 @@ def nothing_seen(run: SnapRun, iteration: int) -> SnapStep:
     return _final(run, iteration, start[None], np.ones(1), UNSEEN_CONFIDENCE, False)
 
 
-def found_anywhere(problem: Problem, candidates: Array32, counts: Array, most: int) -> tuple[Hypothesis, ...]:
-    """At most so many modes of candidates (N, 3, 4), of evidence (N, COUNT), best first and each with its
-    chance, where there is no start; none where nothing fits.
+def found_anywhere(search: Search, candidates: Array32, most: int) -> tuple[Hypothesis, ...]:
+    """At most so many modes of candidates (N, 3, 4), best first and each with its chance, where there is no
+    start; none where nothing fits.
     """
-    config = problem.config
+    problem, config, counts = search.problem, search.problem.config, search.evidence(candidates)
     seen = match_shares(counts) >= config.selection.min_match
     if not seen.any():
         return ()
@@ -110,11 +113,16 @@ def found_anywhere(problem: Problem, candidates: Array32, counts: Array, most: i
     values = scores(counts, np.zeros(len(candidates)), config.selection)
     log_odds = values / config.confidence.temperature
     modes = grouped(candidates, int(np.argmax(log_odds)), log_odds, problem.model, config.confidence)
-    poses = problem.uncentred(from_rows(candidates[modes.best[:most]]))
-    found = zip(poses, modes.best, modes.masses, modes.near, strict=False)
+    best = candidates[modes.best[:most]]
+    spreads = surface_spreads(best, search.systems(best, FINAL_TUKEY)[0], problem.model)
+    found = zip(
+        problem.uncentred(from_rows(best)), modes.best, modes.masses, modes.near, spreads, strict=False
+    )
     return tuple(
-        Hypothesis(T, float(mass), confidence(near, float(values[k]), counts[k], config.confidence))
-        for T, k, mass, near in found
+        Hypothesis(
+            T, float(mass), confidence(near, float(values[k]), counts[k], float(spread), config.confidence)
+        )
+        for T, k, mass, near, spread in found
     )
 
 

@@ -4,16 +4,14 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import fields, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from registration_core import pose
 from registration_core.camera import Intrinsics
-from registration_core.color_edges import checked_color
 from registration_core.estimate import Estimate, Hypothesis, SnapStep, WorldEstimate
-from registration_core.problem import OutOfViewError, Problem, checked_depth, checked_mask, checked_problem
+from registration_core.problem import CheckedView, OutOfViewError, Problem, checked_view, problem_of
 from registration_core.search import search_of
 from registration_core.seeding import seed_of
 from registration_core.snap import steps_of
@@ -101,19 +99,11 @@ def snap_views_steps(
     T_world_first = searches[0][1]
     sightings = [Sighting(search, pose.inverse(T) @ T_world_first) for search, T in searches]
     witnesses = [
-        Witness(depth, camera, pose.inverse(T) @ T_world_first, mask)
-        for depth, camera, T, mask, _ in checked[used:]
+        Witness(view.depth, view.camera, pose.inverse(T) @ T_world_first, view.explained)
+        for view, T in checked[used:]
     ]
     run = SnapRun(tuple(sightings), seed, started, tuple(witnesses))
     return (_in_world(step, T_world_first, T_start, run.problem.T_camera_object) for step in steps_of(run))
-
-
-class _CheckedView(NamedTuple):
-    depth: NDArray[np.float32]
-    camera: Intrinsics
-    T_world_camera: Array
-    explained: NDArray[np.bool_] | None
-    color: NDArray[np.uint8] | None
 
 
 def _one_a_view(
@@ -126,31 +116,30 @@ def _one_a_view(
     return images
 
 
-def _checked(number: int, view: View, explained: ArrayLike | None, color: ArrayLike | None) -> _CheckedView:
+def _checked(
+    number: int, view: View, explained: ArrayLike | None, color: ArrayLike | None
+) -> tuple[CheckedView, Array]:
     depth, camera, T_world_camera = view
     try:
-        image = checked_depth(depth, camera)
-        mask = None if explained is None else checked_mask(explained, camera)
-        seen = None if color is None else checked_color(color, camera)
-        return _CheckedView(image, camera, pose.checked(T_world_camera, "T_world_camera"), mask, seen)
+        return checked_view(depth, camera, explained, color), pose.checked(T_world_camera, "T_world_camera")
     except ValueError as error:
         raise ValueError(f"views[{number}]: {error}") from error
 
 
 def _problems(
     model: Registrable,
-    views: Sequence[_CheckedView],
+    views: Sequence[tuple[CheckedView, Array]],
     T_world_object: Array,
     config: SnapConfig,
     start_spread: tuple[float, float] | None,
 ) -> list[tuple[Problem, Array]]:
     """What is to be done in each view that may show the object, and its `T_world_camera` (4, 4)."""
     found = []
-    for depth, camera, T_world_camera, mask, color in views:
-        T = pose.inverse(T_world_camera) @ T_world_object
+    for view, T_world_camera in views:
+        # not made rigid once more: a view at the world's origin gives to the last bit what `snap` gives
+        T_camera_object = pose.inverse(T_world_camera) @ T_world_object
         with suppress(OutOfViewError):
-            problem = checked_problem(model, depth, camera, T, config, start_spread, mask, color)
-            found.append((problem, T_world_camera))
+            found.append((problem_of(model, view, T_camera_object, config, start_spread), T_world_camera))
     if not found:
         raise ValueError("T_world_object puts the object wholly outside the image of every view")
     return found

@@ -31,10 +31,10 @@ export async function getAll(path, params = {}) {
   return items;
 }
 
-/** The next task for me, or null when there is none. */
-export async function nextTask() {
+/** The next task for me among those of a filter, or null when there is none. */
+export async function nextTask(filter) {
   try {
-    return await get("/api/tasks/next");
+    return await get("/api/tasks/next", filter);
   } catch (error) {
     if (error instanceof ApiError && error.status === 404) return null;
     throw error;

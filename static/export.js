@@ -1,10 +1,10 @@
 /** Export: choose a dataset, start the job, see the gate's verdict, download. */
 
-import { showAccount } from "./account.js";
 import { get, getAll, post } from "./api.js";
 import { byId, element, icon, setText } from "./dom.js";
 import { count, fileSize } from "./format.js";
 import { messageArea } from "./message.js";
+import { openPage } from "./page.js";
 
 const POLL_MS = 500;
 const STATES = {
@@ -18,18 +18,17 @@ const ENDED = new Set(["done", "failed"]);
 const message = messageArea(byId("message"));
 let datasets = [];
 let followed = null;
+let shown = null;
 
 byId("dataset").addEventListener("change", showContents);
 byId("export-form").addEventListener("submit", start);
 byId("copy").addEventListener("click", copyCurl);
+byId("without").addEventListener("click", exportRest);
 
-try {
-  const me = await showAccount();
-  if (me.role === "admin") await showPage();
+await openPage(message, async ({ role }) => {
+  if (role === "admin") await showPage();
   else message.show("Exports are made by administrators. Ask one of them for this dataset.");
-} catch (error) {
-  message.problem(error, { label: "Try again", run: () => location.reload() });
-}
+});
 
 async function showPage() {
   datasets = await getAll("/api/datasets");
@@ -44,7 +43,7 @@ async function showPage() {
   showContents();
   const jobs = await showEarlier();
   const unfinished = jobs.find(({ state }) => !ENDED.has(state));
-  if (unfinished) await follow(unfinished.id);
+  if (unfinished) follow(unfinished.id).catch(message.problem);
 }
 
 function chosen() {
@@ -68,10 +67,21 @@ function showContents() {
 
 async function start(event) {
   event.preventDefault();
+  await begin({ dataset_id: chosen().id, format: byId("format").value });
+}
+
+/** Asks for the export that is shown again, without what it failed on. */
+async function exportRest() {
+  const { dataset_id, format, scene_ids, without, failures } = shown;
+  const failed = failures.map(({ registration_id: id }) => id);
+  await begin({ dataset_id, format, scene_ids, without: [...without, ...failed] });
+}
+
+async function begin(request) {
   message.clear();
   byId("start").disabled = true;
   try {
-    const { id } = await post("/api/exports", { dataset_id: chosen().id, format: "bop" });
+    const { id } = await post("/api/exports", request);
     await follow(id);
   } catch (error) {
     message.problem(error);
@@ -95,6 +105,7 @@ async function follow(id) {
 
 function showJob(job) {
   const ended = ENDED.has(job.state);
+  shown = job;
   byId("job").hidden = false;
   setText(byId("job-title"), jobName(job));
   if (byId("job-state").dataset.state !== job.state) byId("job-state").replaceChildren(...verdict(job));
@@ -102,8 +113,18 @@ function showJob(job) {
   byId("progress").hidden = ended;
   byId("progress").value = job.progress;
   setText(byId("job-message"), job.message ?? "");
+  byId("failures-area").hidden = job.failures.length === 0;
+  byId("failures").replaceChildren(...job.failures.map(failureItem));
   byId("result").hidden = job.state !== "done";
   if (job.state === "done") showDownload(job);
+}
+
+/** One object: where it was put, whose it is, why it did not pass, and a link to it. */
+function failureItem({ registration_id, object, operator, scene, image_id, reason, picture_url }) {
+  const picture = element("img", { src: picture_url, alt: `${object} as it was put`, loading: "lazy" });
+  const link = element("a", { href: `/replay/${registration_id}` }, object);
+  const place = element("small", { className: "muted" }, `${scene}, image ${image_id} · by ${operator}`);
+  return element("li", {}, picture, element("div", {}, link, element("p", {}, reason), place));
 }
 
 function showDownload(job) {

@@ -22,11 +22,6 @@ export function fileSize(bytes) {
   return `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
 }
 
-/** "mug", or "mug #2" where the object is asked for several times. */
-export function taskName({ object, instance, instances }) {
-  return instances > 1 ? `${object.name} #${instance + 1}` : object.name;
-}
-
 /** "3 frames", "3 frames, 2 of 2 others agree"; empty where there is one frame and nothing to add. */
 export function framesText(frames) {
   if (!frames) return "";

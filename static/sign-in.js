@@ -7,13 +7,16 @@ import { messageArea } from "./message.js";
 const form = byId("sign-in");
 const message = messageArea(byId("message"));
 
-const token = decodeURIComponent(location.hash.slice(1));
-if (token) signInByLink(token);
+signInByLink();
+window.addEventListener("hashchange", signInByLink); // a link pasted into this tab does not load the page again
 form.addEventListener("submit", signInByPassword);
 
-async function signInByLink(token) {
+async function signInByLink() {
+  const token = decodeURIComponent(location.hash.slice(1));
+  if (!token) return;
   // The token must not stay in the address, from where it would reach the history.
   history.replaceState(null, "", location.pathname + location.search);
+  message.clear();
   setLinking(true);
   try {
     await post("/api/sign-in/link", { token });

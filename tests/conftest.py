@@ -14,7 +14,17 @@ REPOSITORY = Path(__file__).resolve().parents[1]
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Real RGB-D scenes that lie beside the repository; tests that need them are skipped without."""
-    folder = REPOSITORY.parent / "shared" / "data"
+    return _beside("data")
+
+
+@pytest.fixture(scope="session")
+def shared_cases() -> Path:
+    """Small datasets that people reported problems with, beside the repository, as the scenes are."""
+    return _beside("cases")
+
+
+def _beside(name: str) -> Path:
+    folder = REPOSITORY.parent / "shared" / name
     if not folder.is_dir():
-        pytest.skip(f"needs the real scenes in {folder}")
+        pytest.skip(f"needs {folder}")
     return folder

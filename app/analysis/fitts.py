@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 LEAST_MARGINS = 3
 """A line through two points says nothing of how well it fits."""
+ROUNDING = 1e-9
+"""Seconds: means of equal times differ by less, and no line goes through that."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,11 @@ class Fitts:
     """D, metres or radians."""
     margins: int
     """Points of the line."""
+    bits: tuple[float, float]
+    """The least and the greatest index of difficulty."""
+    operators: int
+    trials: int
+    """At the margin that fewest come within."""
     a: float
     """Seconds."""
     a_interval: tuple[float, float]
@@ -60,6 +67,9 @@ def fitts(curve: Curve, distance: float, seed: int) -> Fitts | None:
     return Fitts(
         distance=distance,
         margins=int(used.sum()),
+        bits=(float(bits.min()), float(bits.max())),
+        operators=int(curve.operators[used].min()),
+        trials=int(curve.trials[used].min()),
         a=float(a),
         a_interval=_interval(some_a) if enough else (np.nan, np.nan),
         b=float(b),
@@ -73,6 +83,7 @@ def _lines(bits: Array, seconds: Array) -> tuple[Array, Array, Array]:
     """Least squares of seconds (B, K) over bits (K,): intercepts, slopes and R^2, (B,) each."""
     x = bits - bits.mean()
     y = seconds - seconds.mean(axis=1, keepdims=True)
+    y = np.where(np.abs(y) < ROUNDING, 0.0, y)
     slope = y @ x / (x @ x)
     total = (y**2).sum(axis=1)
     left = ((y - slope[:, None] * x) ** 2).sum(axis=1)

@@ -19,6 +19,8 @@ class HandOff:
     """Metres or radians."""
     is_largest: bool
     """Whether it is the largest of all margins: the curves may part farther out."""
+    is_smallest: bool
+    """Whether it is the only one that counts: at no smaller margin there are enough operators to compare."""
     best_margin: float
     """Where it saves most for sure."""
     saved: float
@@ -43,7 +45,8 @@ def hand_off(human: Array, stg: Array, operators: Sequence[str], margins: Array,
     low, high = bounds(resampled_means(saved, seed), count)
     with np.errstate(invalid="ignore"):
         mean = np.where(known, saved, 0.0).sum(axis=0) / count
-    ahead = (np.nan_to_num(low, nan=-1.0) > 0.0) & (2 * count >= len(saved))
+    enough = 2 * count >= len(saved)
+    ahead = (np.nan_to_num(low, nan=-1.0) > 0.0) & enough
     if not ahead.any():
         return None
     best = int(np.where(ahead, mean, -np.inf).argmax())
@@ -52,6 +55,7 @@ def hand_off(human: Array, stg: Array, operators: Sequence[str], margins: Array,
     return HandOff(
         margin=float(margins[first]),
         is_largest=first == 0,
+        is_smallest=not enough[first + 1 :].any(),
         best_margin=float(margins[best]),
         saved=float(mean[best]),
         saved_interval=(float(low[best]), float(high[best])),

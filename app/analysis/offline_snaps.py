@@ -99,7 +99,9 @@ def snaps_at(times: Array, snaps: SnapsBySecond) -> SnapsAt:
 def about_snaps(trials: Sequence[TrialTrace], snaps: Mapping[Method, StudySnaps]) -> Iterator[Remark]:
     """What is to be said of the snaps of the trials that count."""
     if not any(trial.stg for trial in trials):
-        yield Remark(ABOUT, "none were computed; there are no STG curves")
+        yield Remark(
+            ABOUT, f"none were computed; there are no STG curves until {COMMANDS['default']} computes them"
+        )
         return
     for method in METHODS:
         if any(method in trial.stg for trial in trials):

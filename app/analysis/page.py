@@ -1,11 +1,12 @@
 """A report as one HTML file that opens anywhere: no script, nothing from elsewhere."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
 from app.analysis.bootstrap import RESAMPLES, Interval
-from app.analysis.cells import CURVE_NAMES
+from app.analysis.cautions import fitts_caution, hand_off_caution
+from app.analysis.cells import CURVE_NAMES, Cell
 from app.analysis.figure import figure_bytes, shown_conditions
 from app.analysis.fitts import Fitts
 from app.analysis.hand_off import HandOff
@@ -14,16 +15,18 @@ from app.analysis.remarks import counted
 from app.analysis.report import Report
 from app.analysis.trial import ErrorKind
 from app.analysis.units import interval_told, number_told, share_told, told
+from app.tables import Method
 
 STYLE = """
 :root { color-scheme: light dark; --line: #d9dad6; --soft: #f4f4f1; }
 @media (prefers-color-scheme: dark) { :root { --line: #3a4047; --soft: #24282d; } }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1.5rem; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }
-table { border-collapse: collapse; display: block; overflow-x: auto; }
+table { border-collapse: collapse; } .table { overflow-x: auto; }
 th, td { text-align: left; padding: .3rem .9rem .3rem 0; border-bottom: 1px solid var(--line);
   font-variant-numeric: tabular-nums; }
 figure { margin: 1rem 0; padding: 1rem; background: #fff; } figure svg { width: 100%; height: auto; }
+.caution { border-left: 4px solid #c99a2c; padding-left: .8rem; }
 .simulated { padding: .6rem 1rem; border-left: 4px solid #c99a2c; background: var(--soft); font-weight: 600; }
 """
 
@@ -48,7 +51,10 @@ def page_of(report: Report) -> str:
     ]
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
-        f"<style>{STYLE}</style>\n</head>\n<body>\n" + "\n".join(filter(None, parts)) + "\n</body>\n</html>\n"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<style>{STYLE}</style>\n</head>\n<body>\n<main>\n"
+        + "\n".join(filter(None, parts))
+        + "\n</main>\n</body>\n</html>\n"
     )
 
 
@@ -123,16 +129,20 @@ def _hand_offs(report: Report) -> str:
             "seconds saved there",
         ),
         (
-            (
-                cell.group,
-                cell.mode,
-                cell.condition,
-                method,
-                cell.error,
-                *_hand_off(stg.hand_off, cell.error),
-            )
+            row
             for cell in report.cells
             for method, stg in cell.stg.items()
+            for row in _with_caution(
+                (
+                    cell.group,
+                    cell.mode,
+                    cell.condition,
+                    method,
+                    cell.error,
+                    *_hand_off(stg.hand_off, cell.error),
+                ),
+                hand_off_caution(stg.hand_off) if stg.hand_off else "",
+            )
         ),
     )
 
@@ -149,24 +159,34 @@ def _fitts(report: Report) -> str:
     return _table(
         ("group", "mode", "condition", "error", "by", "D", "margins", "a", "b", "R²", "bits/s"),
         (
-            (
-                cell.group,
-                cell.mode,
-                cell.condition,
-                cell.error,
-                CURVE_NAMES[method],
-                told(line.distance, cell.error),
-                line.margins,
-                interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
-                interval_told(Interval(line.b, *line.b_interval, cell.operators), None) + " a bit",
-                number_told(line.r_squared),
-                _throughput(line),
-            )
+            row
             for cell in report.cells
             for method, drawn in cell.curves
-            if (line := drawn.fitts) is not None
+            for row in _with_caution(_fitts_row(cell, method, drawn.fitts), fitts_caution(drawn.fitts))
         ),
     )
+
+
+def _fitts_row(cell: Cell, method: Method | None, line: Fitts | None) -> Sequence[object]:
+    which = (cell.group, cell.mode, cell.condition, cell.error, CURVE_NAMES[method])
+    if line is None:
+        return (*which, *["–"] * 6)
+    return (
+        *which,
+        told(line.distance, cell.error),
+        line.margins,
+        interval_told(Interval(line.a, *line.a_interval, cell.operators), None),
+        interval_told(Interval(line.b, *line.b_interval, cell.operators), None) + " a bit",
+        number_told(line.r_squared),
+        _throughput(line),
+    )
+
+
+def _with_caution(row: Sequence[object], caution: str) -> Iterator[Sequence[object]]:
+    """A row, and below it what there is to say against it."""
+    yield row
+    if caution:
+        yield (caution,)
 
 
 def _throughput(line: Fitts) -> str:
@@ -247,13 +267,19 @@ def _section(title: str, sentences: Sequence[str], table: str) -> str:
     if not sentences and not table:
         return ""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
-    return f"<h2>{escape(title)}</h2>" + (f"<ul>{items}</ul>" if items else "") + table
+    # a table that is wider than the page has to be reached by keys to be scrolled
+    held = f'<div class="table" role="group" aria-label="{escape(title)}" tabindex="0">{table}</div>'
+    return f"<h2>{escape(title)}</h2>" + (f"<ul>{items}</ul>" if items else "") + (held if table else "")
 
 
 def _table(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Empty where there are no rows."""
+    """Empty where there are no rows; a row of one cell is about the row above, and as wide as the table."""
     head = "".join(f'<th scope="col">{escape(name)}</th>' for name in names)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{escape(str(value))}</td>" for value in row) + "</tr>" for row in rows
-    )
+    body = "".join(f"<tr>{_cells(row, len(names))}</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>" if body else ""
+
+
+def _cells(row: Sequence[object], columns: int) -> str:
+    if len(row) == 1:
+        return f'<td class="caution" colspan="{columns}">{escape(str(row[0]))}</td>'
+    return "".join(f"<td>{escape(str(value))}</td>" for value in row)

@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, joinedload
 from app.analysis.remarks import Remark, counted
 from app.analysis.trial import TrialInfo
 from app.scene_data import symmetries_from_json
-from app.tables import Object, Participant, Registration, Scene, Study, Task, Trial
+from app.tables import NAMED, Object, Participant, Registration, Scene, Study, Task, Trial
 
 Array = NDArray[np.float64]
 Place = tuple[int, int, int]
@@ -89,7 +89,7 @@ def runs_of(session: Session, study_id: int) -> tuple[list[Run], list[Remark]]:
     return runs, remarks
 
 
-TASK_PARTS = (joinedload(Task.scene).joinedload(Scene.dataset), joinedload(Task.object))
+TASK_PARTS = (joinedload(Task.scene).joinedload(Scene.dataset), *NAMED)
 """What is loaded with a task that is to be named."""
 
 
@@ -111,8 +111,7 @@ def about_trial(participant: Participant, task: Task) -> str:
 
 def place_name(task: Task) -> str:
     """How people call what is registered where."""
-    name = f"{scene_name(task.scene)}, {task.object.name}"
-    return f"{name} #{task.instance + 1}" if task.instance else name
+    return f"{scene_name(task.scene)}, {task.name}"
 
 
 def scene_name(scene: Scene) -> str:

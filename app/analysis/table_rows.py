@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from app.analysis.bootstrap import Interval
+from app.analysis.cautions import fitts_caution, hand_off_caution
 from app.analysis.cells import Cell, Drawn
 from app.analysis.report import Report
 from app.analysis.trial import ERROR_KINDS, ErrorKind, TrialTrace
@@ -38,6 +39,10 @@ def _fitts_rows(report: Report) -> Iterator[Row]:
                 **_hand_row(method),
                 "distance": in_people_units(line.distance, cell.error),
                 "margins": line.margins,
+                "bits_low": line.bits[0],
+                "bits_high": line.bits[1],
+                "operators": line.operators,
+                "trials": line.trials,
                 "a": line.a,
                 "a_low": line.a_interval[0],
                 "a_high": line.a_interval[1],
@@ -48,6 +53,7 @@ def _fitts_rows(report: Report) -> Iterator[Row]:
                 "bits_per_second": line.throughput,
                 "bits_per_second_low": line.throughput_interval[0],
                 "bits_per_second_high": line.throughput_interval[1],
+                "caution": fitts_caution(line),
             }
 
 
@@ -59,11 +65,13 @@ def _hand_off_rows(report: Report) -> Iterator[Row]:
                 "method": method,
                 "margin": in_people_units(point.margin, cell.error),
                 "is_largest": point.is_largest,
+                "is_smallest": point.is_smallest,
                 "best_margin": in_people_units(point.best_margin, cell.error),
                 "saved_seconds": point.saved,
                 "saved_low": point.saved_interval[0],
                 "saved_high": point.saved_interval[1],
                 "operators": point.operators,
+                "caution": hand_off_caution(point),
             }
 
 

@@ -8,6 +8,7 @@ from app.api.registration_state import RegistrationOut, registration_out
 from app.auth import Identity
 from app.labeling.copying import Copy, copies_for
 from app.labeling.desk import NotFoundError
+from app.labeling.history import PosedBy
 from app.labeling.seat import Seat
 from app.labeling.tools import require
 from app.services import Services
@@ -25,8 +26,9 @@ class CopyOut(BaseModel):
     state: str
     is_neighbour: bool = Field(description="Another frame's, in the axes of the camera; or else this task's.")
     scene: str
-    instance: int
+    name: str = Field(description="Of the object, as that of its task.")
     confidence: float | None
+    posed_by: PosedBy
     T_world_object: Pose = Field(description="In the world that it is copied into.")
     thumbnail_url: str
 
@@ -76,8 +78,9 @@ def _copy_out(copy: Copy, identity: Identity) -> CopyOut:
         state=source.state,
         is_neighbour=copy.is_neighbour,
         scene=source.task.scene.label,
-        instance=source.task.instance,
+        name=source.task.name,
         confidence=copy.confidence,
+        posed_by=copy.posed_by,
         T_world_object=copy.T_world_object.tolist(),
         thumbnail_url=f"/api/tasks/{source.task_id}/thumbnail.jpg",
     )

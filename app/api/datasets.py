@@ -2,7 +2,6 @@
 
 import math
 import shutil
-import tempfile
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -32,9 +31,11 @@ from app.archives import import_archive
 from app.auth import Identity
 from app.calibrating import FEWEST
 from app.config import LEAST_RISK
+from app.importing import ImplausibleDepthError
 from app.labeling.assessment import Standard
 from app.services import Services
 from app.tables import OUTSIDE_STUDIES, CalibrationRow, Dataset, Object, Registration, Scene, Task
+from app.unfinished import unfinished
 from registration_core.acceptance import fewest
 from registration_core.algorithm import ALGORITHM
 
@@ -53,7 +54,12 @@ UPLOAD_BODY = {
                         "type": "string",
                         "format": "binary",
                         "description": "A zip file with one BOP dataset.",
-                    }
+                    },
+                    "depth_scale": {
+                        "type": "number",
+                        "exclusiveMinimum": 0,
+                        "description": "In the place of the dataset's own: raw depth times it is mm.",
+                    },
                 },
             }
         }
@@ -97,6 +103,14 @@ class AcceptanceOut(BaseModel):
     needs: int = Field(description="The fewest registrations of its own that could bear this risk out.")
 
 
+class WarningOut(BaseModel):
+    """Something that looked odd when a dataset was imported."""
+
+    text: str
+    images: list[str] = Field(description='Those that show it, as "test/000001, image 3"; the first few.')
+    accepted: bool = Field(description="Whether a lead said that it is right so.")
+
+
 class DatasetOut(BaseModel):
     """A dataset and how far its work is."""
 
@@ -109,11 +123,14 @@ class DatasetOut(BaseModel):
     scenes: int
     tasks: int
     tasks_submitted: int
+    modes: list[str] = Field(description="Of its tasks.")
+    conditions: list[str] = Field(description="Of its tasks.")
     risk: float = Field(description="Share of wrong poses among those that the machine may accept.")
     risk_is_set: bool = Field(description="Whether it was set for this dataset; else the settings say it.")
     risk_of_settings: float
     acceptance: AcceptanceOut
     calibration: CalibrationOut | None = Field(description="Null where the shipped one is used.")
+    warnings: list[WarningOut] = Field(description="What looked odd when it was imported, but was taken.")
     created_at: datetime
 
 
@@ -151,6 +168,15 @@ def set_risk(dataset_id: Id, body: Risk, services: ServicesDep, _identity: Revie
         return _out(services, session, row_or_404(session, Dataset, dataset_id))
 
 
+@router.post("/{dataset_id}/warnings/accept")
+def accept_warnings(dataset_id: Id, services: ServicesDep, _identity: ReviewerDep) -> DatasetOut:
+    """Say that what looked odd when the dataset was imported is right so."""
+    with services.database.write() as session:
+        row = row_or_404(session, Dataset, dataset_id)
+        row.warnings = [{**warning, "accepted": True} for warning in row.warnings]
+    return get_dataset(dataset_id, services, _identity)
+
+
 @router.post("", status_code=201, openapi_extra={"requestBody": UPLOAD_BODY})
 async def upload_dataset(request: Request, services: ServicesDep, identity: AdminDep) -> DatasetOut:
     """Take a BOP dataset in from a zip file; checked whole before anything is kept."""
@@ -160,7 +186,8 @@ async def upload_dataset(request: Request, services: ServicesDep, identity: Admi
         file = form.get("file")
         if not isinstance(file, UploadFile):
             raise InputError("body.file: Send the zip file in a form field of this name.")
-        return await run_in_threadpool(_take_in, file, services, identity)
+        depth_scale = _depth_scale(form.get("depth_scale"))
+        return await run_in_threadpool(_take_in, file, depth_scale, services, identity)
 
 
 def _check_length(request: Request, services: Services) -> None:
@@ -171,16 +198,29 @@ def _check_length(request: Request, services: Services) -> None:
         raise HTTPException(413, f"The upload is larger than {services.settings.max_upload_mb} MB.")
 
 
-def _take_in(file: UploadFile, services: Services, identity: Identity) -> DatasetOut:
+def _depth_scale(text: UploadFile | str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        return float(str(text))
+    except ValueError:
+        raise InputError("body.depth_scale: Must be a number: raw depth times it is millimetres.") from None
+
+
+def _take_in(
+    file: UploadFile, depth_scale: float | None, services: Services, identity: Identity
+) -> DatasetOut:
     services.settings.state_dir.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=services.settings.state_dir) as folder:
-        archive = Path(folder) / "upload.zip"
+    with unfinished(services.settings.state_dir) as folder:
+        archive = folder / "upload.zip"
         with archive.open("wb") as target:
             shutil.copyfileobj(file.file, target)
         try:
             name = Path(file.filename or "dataset").stem
             max_bytes = services.settings.max_upload_mb * MEGABYTE
-            summary = import_archive(services.database, services.files, archive, name, max_bytes)
+            summary = import_archive(services.database, services.files, archive, name, max_bytes, depth_scale)
+        except ImplausibleDepthError as error:
+            raise InputError(f"{error}.", {"depth_scale": error.suggested}) from error
         except ValueError as error:
             raise InputError(f"{error}.") from error
     services.preparation.look()
@@ -211,9 +251,8 @@ def _acceptance_out(standard: Standard) -> AcceptanceOut:
 
 
 def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
-    tasks = (
-        select(func.count(Task.id)).join(Task.scene).where(Scene.dataset_id == row.id, ~Task.is_for_studies)
-    )
+    ordinary = (Task.scene_id == Scene.id) & (Scene.dataset_id == row.id) & ~Task.is_for_studies
+    tasks = select(func.count(Task.id)).where(ordinary)
     submitted = (
         select(func.count(distinct(Registration.task_id)))
         .join(Registration.task)
@@ -232,10 +271,13 @@ def _out(services: Services, session: Session, row: Dataset) -> DatasetOut:
         scenes=session.scalar(select(func.count(Scene.id)).where(Scene.dataset_id == row.id)) or 0,
         tasks=session.scalar(tasks) or 0,
         tasks_submitted=session.scalar(submitted) or 0,
+        modes=sorted(session.scalars(select(Task.mode).where(ordinary).distinct())),
+        conditions=sorted(session.scalars(select(Task.condition).where(ordinary).distinct())),
         risk=standard.risk,
         risk_is_set=row.risk is not None,
         risk_of_settings=services.standards.risk,
         acceptance=_acceptance_out(standard),
         calibration=_calibration_out(row.calibration),
+        warnings=[WarningOut(**warning) for warning in row.warnings],
         created_at=row.created_at,
     )

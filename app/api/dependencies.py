@@ -26,8 +26,6 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 LARGEST_PAGE = 500
 EXAMPLE_POSE = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]
 """For the interface's description."""
-LARGEST_COORDINATE = 1e8
-"""Metres; what is computed from a pose farther away overflows."""
 
 Row = TypeVar("Row")
 
@@ -131,8 +129,8 @@ def rigid_pose(value: Pose, name: str) -> NDArray[np.float64]:
         T = pose.checked(value, name)
     except ValueError as error:
         raise InputError(f"{error}.") from error
-    farthest = float(np.abs(T[:3, 3]).max())
-    if farthest > LARGEST_COORDINATE:
+    if not pose.is_within_reach(T):
+        farthest = float(np.abs(T[:3, 3]).max())
         raise InputError(f"{name} puts the object {farthest:.3g} metres away; positions are in metres.")
     return T
 

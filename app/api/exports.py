@@ -1,7 +1,7 @@
 """Exports: starting one, how far it is, and the finished archive."""
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException
 from fastapi.responses import FileResponse
@@ -21,17 +21,39 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.problems import InputError
+from app.export.selection import Choice
 from app.services import Services
-from app.tables import Dataset, Export
+from app.tables import Dataset, Export, Format, Scene
 
 router = APIRouter(prefix="/api/exports", tags=["exports"])
+
+RowId = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
 class NewExport(BaseModel):
     """What is to be exported, and how."""
 
     dataset_id: int = Field(ge=1, le=2**31 - 1)
-    format: Literal["bop"] = "bop"
+    format: Format = Field("bop", description='A whole dataset, or "csv": its poses alone.')
+    scene_ids: list[RowId] | None = Field(
+        None, min_length=1, max_length=10_000, description="Scenes to export; all where left out."
+    )
+    without: list[RowId] = Field(
+        [], max_length=10_000, description="Registrations to leave out, such as those that failed the checks."
+    )
+
+
+class FailureOut(BaseModel):
+    """An object that did not pass the checks."""
+
+    registration_id: int
+    task_id: int
+    object: str
+    operator: str
+    scene: str
+    image_id: int
+    reason: str
+    picture_url: str
 
 
 class ExportId(BaseModel):
@@ -50,6 +72,9 @@ class ExportOut(BaseModel):
     state: str
     progress: float
     message: str
+    scene_ids: list[int] | None
+    without: list[int]
+    failures: list[FailureOut] = Field(description="Objects that did not pass; `without` exports the rest.")
     created_at: datetime
     bytes: int | None
     download_url: str | None
@@ -57,11 +82,16 @@ class ExportOut(BaseModel):
 
 @router.post("", status_code=202)
 def start_export(body: NewExport, services: ServicesDep, identity: AdminDep) -> ExportId:
-    """Start an export of all submitted poses of a dataset."""
+    """Start an export of the submitted poses of a dataset, or of a part of it."""
     with services.database.read() as session:
         if session.get(Dataset, body.dataset_id) is None:
             raise InputError(f"dataset_id {body.dataset_id} is no dataset; choose one of GET /api/datasets.")
-    return ExportId(id=services.export_jobs.start(body.dataset_id, body.format, identity.user_id).id)
+        own = set(session.scalars(select(Scene.id).where(Scene.dataset_id == body.dataset_id)))
+    strange = sorted(set(body.scene_ids or ()) - own)
+    if strange:
+        raise InputError(f"scene_ids: scene {strange[0]} is not of dataset {body.dataset_id}.")
+    choice = Choice(None if body.scene_ids is None else frozenset(body.scene_ids), frozenset(body.without))
+    return ExportId(id=services.export_jobs.start(body.dataset_id, body.format, identity.user_id, choice).id)
 
 
 @router.get("")
@@ -86,6 +116,17 @@ def get_export(export_id: Id, services: ServicesDep, _identity: AdminDep) -> Exp
     return _out(services, _export(services, export_id))
 
 
+@router.get("/{export_id}/failures/{registration_id}.jpg", response_class=FileResponse)
+def get_failure_picture(
+    export_id: Id, registration_id: Id, services: ServicesDep, _identity: AdminDep
+) -> FileResponse:
+    """Where an object that did not pass was put, drawn into what the camera saw."""
+    for failure in _export(services, export_id).failures:
+        if failure["registration_id"] == registration_id:
+            return FileResponse(services.files.path(failure["picture_hash"]), media_type="image/jpeg")
+    raise HTTPException(404, f"Export {export_id} has no failure of registration {registration_id}.")
+
+
 @router.get("/{export_id}/download", response_class=FileResponse)
 def download(export_id: Id, services: ServicesDep, _identity: AdminDep) -> FileResponse:
     """The finished archive; parts of it by Range, named by its content."""
@@ -106,7 +147,7 @@ def _export(services: Services, export_id: int) -> Export:
 
 
 def _out(services: Services, row: Export) -> ExportOut:
-    size = services.files.path(row.file_hash).stat().st_size if row.file_hash else None
+    size = services.files.size(row.file_hash) if row.file_hash else None
     return ExportOut(
         id=row.id,
         dataset_id=row.dataset_id,
@@ -115,7 +156,15 @@ def _out(services: Services, row: Export) -> ExportOut:
         state=row.state,
         progress=row.progress,
         message=row.message,
+        scene_ids=row.choice["scene_ids"],
+        without=row.choice["without"],
+        failures=[_failure_out(row, failure) for failure in row.failures],
         created_at=row.created_at,
         bytes=size,
         download_url=f"/api/exports/{row.id}/download" if row.file_hash else None,
     )
+
+
+def _failure_out(row: Export, failure: dict[str, Any]) -> FailureOut:
+    told = {field: failure[field] for field in FailureOut.model_fields if field in failure}
+    return FailureOut(**told, picture_url=f"/api/exports/{row.id}/failures/{failure['registration_id']}.jpg")

@@ -3,10 +3,10 @@
 from typing import Any
 
 from fastapi import APIRouter, Response
-from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 from sqlalchemy import select
 
+from app import textured_mesh
 from app.api.dependencies import (
     AfterDep,
     AnyoneDep,
@@ -22,11 +22,12 @@ from app.api.dependencies import (
 )
 from app.api.scenes import FOREVER
 from app.auth import Identity
+from app.labeling.desk import NotFoundError
 from app.outline_mesh import packed
 from app.services import Services
 from app.symmetries import present_axes, suggestions_of, version_before
 from app.tables import Object, Task
-from registration_core.object_model import read_mesh
+from registration_core.mesh_file import plain_ply, read_mesh
 
 router = APIRouter(prefix="/api/objects", tags=["objects"])
 
@@ -72,6 +73,7 @@ class ObjectDetail(ObjectOut):
         description="Best first; null where the mesh was never looked into: it came with symmetries, or was "
         "imported by an older version, and has not had its turn yet."
     )
+    textured_mesh_url: str | None = Field(description="Null where the mesh has no colours of its own.")
     undo_version: int | None = Field(description="The version that undo restores.")
 
 
@@ -102,13 +104,10 @@ def get_object(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> Obj
 
 @router.get("/{object_id}/mesh.ply", response_class=Response)
 def get_mesh(object_id: Id, services: ServicesDep, identity: IdentityDep) -> Response:
-    """The object's mesh, millimetres, as it was imported."""
+    """The object's mesh as PLY, millimetres: triangles, little-endian, as every tool reads it."""
     row = _object(services, object_id, identity)
-    path = services.files.path(row.mesh_hash)
-    if row.mesh_format == "ply":
-        return FileResponse(path, media_type="application/octet-stream")
-    content = read_mesh(path.read_bytes(), row.mesh_format).export(file_type="ply")
-    return Response(content, media_type="application/octet-stream")
+    mesh = read_mesh(services.files.read(row.mesh_hash), row.mesh_format)
+    return Response(plain_ply(mesh), media_type="application/octet-stream")
 
 
 @router.get("/{object_id}/outline.mesh", response_class=Response)
@@ -116,6 +115,15 @@ def get_outline_mesh(object_id: Id, services: ServicesDep, identity: AnyoneDep) 
     """The mesh thinned for drawing outlines: uint32 V and F, float32 (V, 3) in metres, uint32 (F, 3)."""
     content = packed(services.data.thinned_model(_object(services, object_id, identity)))
     return Response(content, media_type="application/octet-stream", headers=FOREVER)
+
+
+@router.get("/{object_id}/textured.mesh", response_class=Response)
+def get_textured_mesh(object_id: Id, services: ServicesDep, identity: AnyoneDep) -> Response:
+    """The mesh for drawing, with its texture or vertex colours, as `docs/rest.md` lays it out."""
+    mesh = services.data.textured(_object(services, object_id, identity))
+    if mesh is None:
+        raise NotFoundError(f"Object {object_id} has no colours of its own.")
+    return Response(textured_mesh.packed(mesh), media_type="application/octet-stream", headers=FOREVER)
 
 
 def detail_of(services: Services, row: Object) -> ObjectDetail:
@@ -129,8 +137,15 @@ def detail_of(services: Services, row: Object) -> ObjectDetail:
             centre=((low + high) / 2.0).tolist(),
             axes=present_axes(session, row),
             suggestions=suggestions_of(session, row),
+            textured_mesh_url=None if services.data.textured(row) is None else _textured_url(row),
             undo_version=version_before(session, row),
         )
+
+
+def _textured_url(row: Object) -> str:
+    """Changes with what is behind it, since that is kept by browsers."""
+    content = f"{row.mesh_hash[:16]}{(row.texture_hash or '')[:16]}"
+    return f"/api/objects/{row.id}/textured.mesh?content={content}"
 
 
 def _object(services: Services, object_id: int, identity: Identity) -> Object:

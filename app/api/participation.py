@@ -8,7 +8,6 @@ from pydantic import BaseModel, Field
 from app.api.dependencies import AnyoneDep, ServicesDep
 from app.auth import Identity, Role
 from app.study.participation import Place, ScreenKind, place_of
-from app.study.plan import Question
 from app.tables import Condition, Mode
 
 router = APIRouter(prefix="/api/participation", tags=["studies"])
@@ -36,6 +35,14 @@ class NextTask(BaseModel):
     instructions: str
 
 
+class QuestionOut(BaseModel):
+    """What is asked once, before the tasks."""
+
+    text: str
+    choices: list[str] = Field(description="None: a short free answer.")
+    optional: bool = Field(description="May be left empty.")
+
+
 class ParticipationOut(BaseModel):
     """Where a participant stands."""
 
@@ -49,7 +56,7 @@ class ParticipationOut(BaseModel):
         "consent and questions stay until they are answered."
     )
     consent: str
-    questions: list[Question]
+    questions: list[QuestionOut]
     task: NextTask | None
 
 
@@ -57,7 +64,7 @@ class Answers(BaseModel):
     """What a participant answers."""
 
     answers: dict[str, Annotated[str, Field(max_length=1000)]] = Field(
-        max_length=30, description="By the questions' texts."
+        max_length=30, description="By the questions' texts; empty or left out where one may be left empty."
     )
 
 
@@ -102,7 +109,10 @@ def _out(place: Place) -> ParticipationOut:
         total=place.total,
         screens=list(place.screens),
         consent=place.plan.consent,
-        questions=place.plan.questions,
+        questions=[
+            QuestionOut(text=one.text, choices=one.offered, optional=one.optional)
+            for one in place.plan.questions
+        ],
         task=_next_task(place),
     )
 

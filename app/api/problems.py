@@ -1,7 +1,7 @@
 """Errors as `application/problem+json` (RFC 9457) with one sentence in `detail`."""
 
-import errno
 import logging
+import sqlite3
 from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
@@ -9,26 +9,34 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import InternalError, OperationalError
 from starlette.exceptions import HTTPException
 
 from app.auth import SignInError, TooManyAttemptsError
+from app.event_log import ErasedError
 from app.labeling.desk import NotFoundError
 from app.labeling.track import ActionError
+from app.storage import DamagedFileError
+from app.storage_faults import FULL, advice
 from app.study.plan import StudyError
 from app.symmetries import OutdatedError
 
 logger = logging.getLogger(__name__)
 
-DISK_FULL = "The disk is full: nothing was saved. Free some space and do it again."
-
-
-DISK_FULL_WORDS = ("disk is full", "No space left on device")
-"""Of SQLite, and of PostgreSQL."""
+DISK_FULL = f"Nothing was saved: {FULL}."
 
 
 class InputError(ValueError):
-    """The request asks for something that cannot be; the message names field and value."""
+    """The request asks for something that cannot be; the message names field and value.
+
+    Args:
+        message: One sentence.
+        suggested: Fields with which it would do.
+    """
+
+    def __init__(self, message: str, suggested: Mapping[str, Any] | None = None) -> None:
+        super().__init__(message)
+        self.suggested = suggested
 
 
 PROBLEM_RESPONSES: dict[int | str, dict[str, Any]] = {
@@ -45,6 +53,10 @@ PROBLEM_RESPONSES: dict[int | str, dict[str, Any]] = {
                         "title": {"type": "string"},
                         "status": {"type": "integer"},
                         "detail": {"type": "string"},
+                        "suggested": {
+                            "type": "object",
+                            "description": "Fields of the request with which it would do.",
+                        },
                     },
                 }
             }
@@ -54,14 +66,21 @@ PROBLEM_RESPONSES: dict[int | str, dict[str, Any]] = {
 """For the OpenAPI document: what every route may answer instead."""
 
 
-def problem(status: int, detail: str, headers: Mapping[str, str] | None = None) -> JSONResponse:
-    """A response that says what is wrong."""
-    content = {
+def problem(
+    status: int,
+    detail: str,
+    headers: Mapping[str, str] | None = None,
+    suggested: Mapping[str, Any] | None = None,
+) -> JSONResponse:
+    """A response that says what is wrong and, where it is known, with which fields it would do."""
+    content: dict[str, Any] = {
         "type": "about:blank",
         "title": HTTPStatus(status).phrase,
         "status": status,
         "detail": detail,
     }
+    if suggested:
+        content["suggested"] = dict(suggested)
     return JSONResponse(content, status, headers, media_type="application/problem+json")
 
 
@@ -69,26 +88,21 @@ def install(app: FastAPI) -> None:
     """Turn errors of the application into problems."""
     for error_type, status in (
         (NotFoundError, HTTPStatus.NOT_FOUND),
+        (ErasedError, HTTPStatus.NOT_FOUND),
         (ActionError, HTTPStatus.CONFLICT),
-        (InputError, HTTPStatus.UNPROCESSABLE_ENTITY),
         (StudyError, HTTPStatus.CONFLICT),
         (OutdatedError, HTTPStatus.CONFLICT),
         (TooManyAttemptsError, HTTPStatus.TOO_MANY_REQUESTS),
         (SignInError, HTTPStatus.UNAUTHORIZED),
+        (DamagedFileError, HTTPStatus.INTERNAL_SERVER_ERROR),
     ):
         app.add_exception_handler(error_type, _say(status))
-    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(InputError, _wrong_input)
+    app.add_exception_handler(HTTPException, http_error)
     app.add_exception_handler(RequestValidationError, _invalid_request)
-    app.add_exception_handler(OperationalError, _storage_error)
-    app.add_exception_handler(OSError, _storage_error)
+    for storage_error in (OperationalError, InternalError, sqlite3.Error, OSError):
+        app.add_exception_handler(storage_error, _storage_error)
     app.add_exception_handler(Exception, _unexpected_error)
-
-
-def is_disk_full(error: BaseException) -> bool:
-    """Whether an error of the database or the file system means that the disk is full."""
-    return (isinstance(error, OSError) and error.errno in {errno.ENOSPC, errno.EDQUOT}) or (
-        isinstance(error, OperationalError) and any(words in str(error.orig) for words in DISK_FULL_WORDS)
-    )
 
 
 def _say(status: HTTPStatus):  # type: ignore[no-untyped-def] # FastAPI wants an exact handler type
@@ -98,11 +112,17 @@ def _say(status: HTTPStatus):  # type: ignore[no-untyped-def] # FastAPI wants an
     return handler
 
 
+def _wrong_input(_request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, InputError)
+    return problem(HTTPStatus.UNPROCESSABLE_ENTITY, _as_sentence(str(error)), suggested=error.suggested)
+
+
 def _as_sentence(text: str) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-def _http_error(request: Request, error: Exception) -> JSONResponse:
+def http_error(request: Request, error: Exception) -> JSONResponse:
+    """An `HTTPException` as a problem."""
     assert isinstance(error, HTTPException)
     detail = str(error.detail)
     if detail == HTTPStatus(error.status_code).phrase:  # the router's own: it names no address
@@ -119,8 +139,10 @@ def _invalid_request(_request: Request, error: Exception) -> JSONResponse:
 
 
 def _storage_error(_request: Request, error: Exception) -> JSONResponse:
-    if is_disk_full(error):
-        return problem(HTTPStatus.INSUFFICIENT_STORAGE, DISK_FULL)
+    known = advice(error)
+    if known is not None:
+        status = HTTPStatus.INSUFFICIENT_STORAGE if known is FULL else HTTPStatus.SERVICE_UNAVAILABLE
+        return problem(status, f"Nothing was saved: {known}.")
     logger.error("the database or the file system failed", exc_info=error)
     return problem(
         HTTPStatus.INTERNAL_SERVER_ERROR,

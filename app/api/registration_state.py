@@ -7,6 +7,7 @@ from pydantic import BaseModel, Field
 
 from app.labeling.assessment import Assessed, Assessment
 from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.history import PosedBy
 from app.labeling.layers import Layers
 from app.labeling.seat import Seat
 from app.labeling.session_state import SessionState
@@ -118,6 +119,7 @@ class RegistrationOut(BaseModel):
     confidence: float | None
     assessment: AssessmentOut | None
     """What is to be thought of the estimate that the pose stems from."""
+    posed_by: PosedBy = Field(description="Whose the pose is: start where the object began.")
     can_undo: bool
     can_redo: bool
     dragging: bool
@@ -125,6 +127,7 @@ class RegistrationOut(BaseModel):
     """Along which the gizmo's arrows lie."""
     layers: Layers
     """What the 3-D view shows."""
+    has_texture: bool = Field(description="Whether the mesh has colours of its own to be shown in.")
     agreement: AgreementOut | None
     """Nothing where no part of the object is in the frame, or the task is done without it."""
     saved: bool
@@ -141,6 +144,9 @@ class RegistrationOut(BaseModel):
     view_url: str
     view_open: bool
     """Whether a page is connected to the 3-D view."""
+    others: list[str] = Field(
+        description="Names of other operators who have this task open in a page now; none in a study."
+    )
 
 
 def registration_out(seat: Seat) -> RegistrationOut:
@@ -164,11 +170,13 @@ def registration_out(seat: Seat) -> RegistrationOut:
         T_camera_object=(pose.inverse(T_world_camera) @ state.T_world_object).tolist(),
         confidence=state.confidence,
         assessment=None if state.assessment is None else assessment_out(state.assessment),
+        posed_by=state.posed_by,
         can_undo=state.can_undo,
         can_redo=state.can_redo,
         dragging=state.dragging,
         gizmo_axes=state.gizmo_axes,
         layers=state.layers,
+        has_texture=seat.textured is not None,
         agreement=_agreement_out(seat, state),
         saved=not state.dragging,
         snap=_snap_out(state),
@@ -182,6 +190,7 @@ def registration_out(seat: Seat) -> RegistrationOut:
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
         view_open=seat.viewers > 0,
+        others=list(seat.others()),
     )
 
 

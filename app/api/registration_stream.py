@@ -49,8 +49,14 @@ async def stream(
         given_way.set()
         loop.call_soon_threadsafe(changed.set)
 
+    def tell_others() -> None:
+        loop.run_in_executor(None, services.desk.tell_others, seat)
+
     unsubscribe = seat.session.subscribe(tell)
-    stand_up = seat.chair.sit(page, give_way) if page else None
+    stand_up = None
+    if page:
+        stand_up = seat.chair.sit(page, give_way)
+        tell_others()
     try:
         while True:
             changed.clear()
@@ -63,10 +69,11 @@ async def stream(
             if not await _in_time(changed) and await asyncio.to_thread(identify, request) is None:
                 return
     finally:
-        if stand_up:
-            stand_up()
         unsubscribe()
         leave()
+        if stand_up:
+            stand_up()
+            tell_others()
 
 
 async def _in_time(changed: asyncio.Event) -> bool:

@@ -12,6 +12,7 @@ from app.api.dependencies import Id, IdentityDep, ServicesDep
 from app.api.registration_state import AssessmentOut, FramesReportOut, assessment_out
 from app.api.tasks import Named
 from app.labeling.assessment import Assessed, Assessment
+from app.labeling.history import PosedBy
 from app.methods import method_of
 from app.replay.recording import Recording, ShownEvent
 from app.replay.replays import Replay
@@ -111,6 +112,7 @@ class MomentOut(BaseModel):
     to_last: ToLast
     confidence: float | None
     assessment: AssessmentOut | None
+    posed_by: PosedBy
     frame_id: int
     ghost: GhostOut | None
 
@@ -167,6 +169,7 @@ def show_moment(body: NewMoment, services: ServicesDep, replay: ReplayDep) -> Mo
         to_last=ToLast(translation=float(translation[0]), rotation=float(rotation[0])),
         confidence=moment.confidence,
         assessment=_assessment_out(moment.assessment),
+        posed_by=moment.posed_by,
         frame_id=frame.id,
         ghost=None
         if ghost is None

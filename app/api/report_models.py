@@ -7,10 +7,12 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from app.analysis.bootstrap import Interval
+from app.analysis.cautions import fitts_caution, hand_off_caution
 from app.analysis.cells import Cell, Drawn, StgCurve
 from app.analysis.comparison import Comparison
 from app.analysis.fitts import Fitts
 from app.analysis.gains import Gain, Moment
+from app.analysis.hand_off import HandOff
 from app.analysis.remarks import Remark
 from app.analysis.trial import ErrorKind
 from app.tables import Method
@@ -43,6 +45,9 @@ class FittsOut(BaseModel):
 
     distance: float
     margins: int
+    bits: tuple[float, float] = Field(description="the least and the greatest index of difficulty")
+    operators: int = Field(description="at the margin that fewest come within, as are the trials")
+    trials: int
     a: float
     a_interval: tuple[float | None, float | None]
     b: float
@@ -57,6 +62,7 @@ class CurveOut(BaseModel):
 
     points: list[PointOut]
     fitts: FittsOut | None
+    fitts_caution: str = Field(description="why it tells little or is not there; empty where all is well")
 
 
 class HandOffOut(BaseModel):
@@ -64,10 +70,12 @@ class HandOffOut(BaseModel):
 
     margin: float
     is_largest: bool = Field(description="of all margins: the curves may part farther out")
+    is_smallest: bool = Field(description="at no smaller one there are enough operators to compare")
     best_margin: float
     saved: float
     saved_interval: tuple[float, float]
     operators: int
+    caution: str = Field(description="why it tells little; empty where nothing speaks against it")
 
 
 class StgOut(CurveOut):
@@ -172,8 +180,11 @@ def number(value: float) -> float | None:
 
 
 def _stg(drawn: StgCurve) -> StgOut:
-    point = drawn.hand_off
-    return StgOut(**_curve(drawn), hand_off=None if point is None else HandOffOut(**vars(point)))
+    return StgOut(**_curve(drawn), hand_off=None if drawn.hand_off is None else _hand_off(drawn.hand_off))
+
+
+def _hand_off(point: HandOff) -> HandOffOut:
+    return HandOffOut(**vars(point), caution=hand_off_caution(point))
 
 
 def _curve(drawn: Drawn) -> dict[str, Any]:
@@ -193,6 +204,7 @@ def _curve(drawn: Drawn) -> dict[str, Any]:
             for k in range(len(curve.margins))
         ],
         "fitts": None if drawn.fitts is None else _fitts(drawn.fitts),
+        "fitts_caution": fitts_caution(drawn.fitts),
     }
 
 
@@ -200,6 +212,9 @@ def _fitts(line: Fitts) -> FittsOut:
     return FittsOut(
         distance=line.distance,
         margins=line.margins,
+        bits=line.bits,
+        operators=line.operators,
+        trials=line.trials,
         a=line.a,
         a_interval=(number(line.a_interval[0]), number(line.a_interval[1])),
         b=line.b,

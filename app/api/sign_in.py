@@ -43,7 +43,9 @@ class Me(BaseModel):
 def sign_in(body: Credentials, request: Request, services: ServicesDep) -> Response:
     """Sign in with name and password: sets the login cookie."""
     _refuse_foreign_page(request)
-    return _with_cookie(request, services, services.auth.sign_in(body.name, body.password), LOGIN_LIFETIME)
+    address = request.client.host if request.client else ""
+    secret = services.auth.sign_in(body.name, body.password, address)
+    return _with_cookie(request, services, secret, LOGIN_LIFETIME)
 
 
 @router.post("/sign-in/link", status_code=204)

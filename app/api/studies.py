@@ -4,13 +4,23 @@ import secrets
 from datetime import datetime
 from typing import Annotated
 
-from fastapi import APIRouter, HTTPException, Request
+from fastapi import APIRouter, HTTPException, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import select
 
 from app.api.dependencies import AdminDep, AfterDep, Id, LimitDep, Page, ServicesDep, page_of, row_or_404
 from app.services import Services
-from app.study.plan import GroupName, Line, StudyPlan, TaskRef, order_of, rows_of_balance
+from app.study.answers import answers_csv
+from app.study.plan import (
+    MINUTES_A_TASK,
+    GroupName,
+    Line,
+    StudyPlan,
+    TaskRef,
+    expected_minutes,
+    order_of,
+    rows_of_balance,
+)
 from app.study.studies import Standing
 from app.tables import Condition, Mode, Participant, Study
 
@@ -50,6 +60,8 @@ class PreviewOut(BaseModel):
     """In which order operators would do what."""
 
     rows_of_balance: int = Field(description="Operators that a group needs for each block in each place.")
+    minutes: float = Field(description="Of one operator, practice included, breaks not; an assumption.")
+    minutes_a_task: dict[Mode, float] = Field(description="Which that assumes.")
     orders: list[list[SlotOut]] = Field(
         description="Of the rows that groups begin with, the first operator of each in the first."
     )
@@ -80,7 +92,9 @@ class ParticipantOut(BaseModel):
     consented_at: datetime | None
     finished_at: datetime | None
     withdrawn_at: datetime | None
-    answers: dict[str, str] | None
+    answers: dict[str, str | None] | None = Field(
+        description="By the questions' texts, null for one that was left empty; null before they are given."
+    )
 
 
 class StudyDetail(StudyOut):
@@ -115,7 +129,12 @@ def preview(body: PlanAndSeed, services: ServicesDep, _identity: AdminDep) -> Pr
         ]
         for row in range(rows)
     ]
-    return PreviewOut(rows_of_balance=rows_of_balance(body.plan), orders=orders)
+    return PreviewOut(
+        rows_of_balance=rows_of_balance(body.plan),
+        minutes=expected_minutes(body.plan),
+        minutes_a_task=dict(MINUTES_A_TASK),
+        orders=orders,
+    )
 
 
 @router.post("", status_code=201)
@@ -140,6 +159,19 @@ def get_study(study_id: Id, services: ServicesDep, _identity: AdminDep) -> Study
     study = _study(services, study_id)
     participants = [_participant_out(standing) for standing in services.studies.progress(study_id)]
     return StudyDetail(**_out(study).model_dump(), participants=participants)
+
+
+@router.get(
+    "/{study_id}/answers.csv", response_class=Response, responses={200: {"content": {"text/csv": {}}}}
+)
+def get_answers(study_id: Id, services: ServicesDep, _identity: AdminDep) -> Response:
+    """What participants answered: a row an answer, with whether it was left empty or declined."""
+    _study(services, study_id)
+    return Response(
+        answers_csv(services.database, study_id),
+        media_type="text/csv; charset=utf-8",
+        headers={"content-disposition": f'attachment; filename="study-{study_id}-answers.csv"'},
+    )
 
 
 @router.post("/{study_id}/close")

@@ -8,7 +8,6 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from app.api.dependencies import (
-    LARGEST_COORDINATE,
     AdminDep,
     Id,
     IdentityDep,
@@ -21,7 +20,7 @@ from app.api.tasks import Named
 from app.services import Services
 from app.symmetries import axes_in, decide, restore, versions_of
 from app.tables import Object, SymmetryVersion
-from registration_core import SymmetryAxis, residual_of
+from registration_core import SymmetryAxis, pose, residual_of
 from registration_core.symmetry_axes import HIGHEST_FOLD
 
 router = APIRouter(prefix="/api/objects", tags=["objects"])
@@ -29,7 +28,7 @@ router = APIRouter(prefix="/api/objects", tags=["objects"])
 MOST_AXES = 31
 """As an icosahedron has them."""
 
-Number = Annotated[float, Field(ge=-LARGEST_COORDINATE, le=LARGEST_COORDINATE, allow_inf_nan=False)]
+Number = Annotated[float, Field(ge=-pose.FARTHEST, le=pose.FARTHEST, allow_inf_nan=False)]
 Triple = tuple[Number, Number, Number]
 
 

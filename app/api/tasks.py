@@ -1,13 +1,14 @@
 """Tasks: what is to be registered, and taking one up."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, HTTPException, Response
+from fastapi import APIRouter, Depends, HTTPException, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import ColumnElement, Select, select
-from sqlalchemy.orm import Session, joinedload, selectinload, undefer
+from sqlalchemy.orm import Session, joinedload, selectinload
 
 from app.api.dependencies import (
     AdminDep,
@@ -32,6 +33,7 @@ from app.start_pose import start_pose
 from app.study.participation import require_turn
 from app.tables import (
     LAST_ASSESSMENT,
+    NAMED,
     OUTSIDE_STUDIES,
     Condition,
     Frame,
@@ -91,6 +93,7 @@ class OperatorRef(BaseModel):
     state: str
     skip_reason: str | None
     registration_id: int
+    is_here: bool = Field(description="Whether they have the task open in a page now.")
     assessment: AssessmentOut | None = Field(
         description="Of the machine's last estimate, for reviewers; null where there is none."
     )
@@ -103,9 +106,10 @@ class TaskOut(BaseModel):
     dataset: Named
     scene: SceneRef
     object: ObjectRef
-    instance: int
+    name: str = Field(description="The object's, with a number where it is in the scene several times.")
+    instance: int = Field(description="From 0 on: #1 in the name.")
     instances: int
-    """How often the object is asked for in this scene, in this mode and condition."""
+    """How often the object is in this scene, as far as any task says."""
     frame_id: int
     mode: str
     condition: str
@@ -118,42 +122,50 @@ class TaskOut(BaseModel):
     thumbnail_url: str
 
 
+@dataclass(frozen=True)
+class TaskFilter:
+    """Which tasks: all, or those of a dataset, a scene, in a state, a mode, under a condition."""
+
+    dataset_id: QueryId = None
+    scene_id: QueryId = None
+    state: TaskState | None = None
+    mode: Mode | None = None
+    condition: Condition | None = None
+
+
+FilterDep = Annotated[TaskFilter, Depends()]
+
+
 @router.get("")
 def list_tasks(
     services: ServicesDep,
     identity: IdentityDep,
-    dataset_id: QueryId = None,
-    scene_id: QueryId = None,
-    state: TaskState | None = None,
+    wanted: FilterDep,
     after: AfterDep = 0,
     limit: LimitDep = 100,
 ) -> Page:
-    """All tasks, or those of a dataset, a scene, or in a state."""
-    query = _tasks().where(~Task.is_for_studies)
-    if dataset_id is not None:
-        query = query.join(Task.scene).where(Scene.dataset_id == dataset_id)
-    if scene_id is not None:
-        query = query.where(Task.scene_id == scene_id)
-    if state is not None:
-        query = query.where(_is_in_state(state))
+    """All tasks, or those of a dataset, a scene, in a state, a mode, under a condition."""
+    query = _ordinary_tasks(wanted)
     with services.database.read() as session:
-        return page_of(session, query, Task.id, after, limit, _out_for(identity))
+        return page_of(session, query, Task.id, after, limit, _out_for(services, identity))
 
 
 @router.get("/next")
-def next_task(services: ServicesDep, identity: IdentityDep) -> TaskOut:
-    """What I should do next: what I have begun, or else what nobody has; 404 where nothing is left."""
-    mine = Task.registrations.any((Registration.user_id == identity.user_id) & (Registration.state == "open"))
+def next_task(services: ServicesDep, identity: IdentityDep, wanted: FilterDep) -> TaskOut:
+    """What I should do next, of all tasks or of a dataset, a scene, in a state, a mode, under a condition.
+
+    That is what I have begun, or else what nobody has (in a state: what I have not); 404 where none is left.
+    """
+    mine = Registration.user_id == identity.user_id
+    begun = Task.registrations.any(mine & (Registration.state == "open"))
+    fresh = ~Task.registrations.any(mine) & _is_in_state(wanted.state or "open")
+    query = _ordinary_tasks(wanted).order_by(Task.id).limit(1)
     with services.database.read() as session:
-        for condition in (mine, _is_in_state("open")):
-            row = (
-                session.scalars(_tasks().where(~Task.is_for_studies, condition).order_by(Task.id).limit(1))
-                .unique()
-                .first()
-            )
+        for condition in (begun, fresh):
+            row = session.scalars(query.where(condition)).unique().first()
             if row is not None:
-                return _out_for(identity)(row)
-    raise HTTPException(404, "All tasks are done or in other hands.")
+                return _out_for(services, identity)(row)
+    raise HTTPException(404, "All tasks that were asked for are done or in other hands.")
 
 
 @router.get("/{task_id}")
@@ -161,7 +173,7 @@ def get_task(task_id: Id, services: ServicesDep, identity: AnyoneDep) -> TaskOut
     """One task."""
     check_sees(services, identity, Task.id == task_id, f"task {task_id}")
     with services.database.read() as session:
-        return _out_for(identity)(_task(session, task_id))
+        return _out_for(services, identity)(_task(session, task_id))
 
 
 @router.post("", status_code=201)
@@ -195,7 +207,7 @@ def create_task(body: NewTask, services: ServicesDep, identity: AdminDep) -> Tas
         task.is_for_studies = False
         task.method = method
         session.flush()
-        return _out_for(identity)(_task(session, task.id))
+        return _out_for(services, identity)(_task(session, task.id))
 
 
 @router.get("/{task_id}/thumbnail.jpg", response_class=Response)
@@ -240,11 +252,26 @@ def _start(services: Services, item: Object, frame: Frame) -> Any:
 def _tasks() -> Select[Task]:
     return select(Task).options(
         joinedload(Task.scene).joinedload(Scene.dataset),
-        joinedload(Task.object),
+        *NAMED,
         joinedload(Task.frame),
-        undefer(Task.instances),
         selectinload(Task.registrations).options(joinedload(Registration.user), LAST_ASSESSMENT),
     )
+
+
+def _ordinary_tasks(wanted: TaskFilter) -> Select[Task]:
+    """Those that are asked for, of no study."""
+    query = _tasks().where(~Task.is_for_studies)
+    if wanted.dataset_id is not None:
+        query = query.join(Task.scene).where(Scene.dataset_id == wanted.dataset_id)
+    if wanted.scene_id is not None:
+        query = query.where(Task.scene_id == wanted.scene_id)
+    if wanted.state is not None:
+        query = query.where(_is_in_state(wanted.state))
+    if wanted.mode is not None:
+        query = query.where(Task.mode == wanted.mode)
+    if wanted.condition is not None:
+        query = query.where(Task.condition == wanted.condition)
+    return query
 
 
 def _task(session: Session, task_id: int) -> Task:
@@ -280,26 +307,33 @@ def _state_of(registrations: Sequence[Registration]) -> TaskState:
     return "submitted" if "submitted" in states else "in_progress" if "open" in states else "skipped"
 
 
-def _out_for(identity: Identity) -> Callable[[Task], TaskOut]:
+def _out_for(services: Services, identity: Identity) -> Callable[[Task], TaskOut]:
     """As somebody may know of tasks: a participant of a study of their own work, others of the ordinary."""
+
+    at_work = services.desk.at_work()
 
     def out(row: Task) -> TaskOut:
         mine = [r for r in row.registrations if r.user_id == identity.user_id]
         ordinary = [r for r in row.registrations if r.user.role != Role.PARTICIPANT]
         shown = mine if identity.role is Role.PARTICIPANT else ordinary
-        return _out(row, shown, mine, identity.role.includes(Role.REVIEWER))
+        return _out(row, shown, mine, at_work, identity.role.includes(Role.REVIEWER))
 
     return out
 
 
 def _out(
-    row: Task, registrations: Sequence[Registration], mine: Sequence[Registration], for_reviewers: bool
+    row: Task,
+    registrations: Sequence[Registration],
+    mine: Sequence[Registration],
+    at_work: Collection[int],
+    for_reviewers: bool,
 ) -> TaskOut:
     return TaskOut(
         id=row.id,
         dataset=Named(id=row.scene.dataset.id, name=row.scene.dataset.name),
         scene=SceneRef(id=row.scene.id, label=row.scene.label),
         object=ObjectRef(id=row.object.id, obj_id=row.object.obj_id, name=row.object.name),
+        name=row.name,
         instance=row.instance,
         instances=row.instances,
         frame_id=row.frame_id,
@@ -313,6 +347,7 @@ def _out(
                 state=r.state,
                 skip_reason=r.skip_reason,
                 registration_id=r.id,
+                is_here=r.id in at_work,
                 assessment=AssessmentOut(**r.last_assessment)
                 if for_reviewers and r.last_assessment
                 else None,

@@ -1,11 +1,10 @@
 """What is not known about the present pose, and whether the 3-D view shows it."""
 
-from typing import Literal
-
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from app.api.dependencies import SeatDep, ServicesDep
+from app.labeling.ambiguity_words import Kind, Motion, names_of_drawn, sentence
 from app.labeling.track import ActionError
 
 router = APIRouter(prefix="/api/registrations", tags=["uncertainty"])
@@ -14,12 +13,13 @@ router = APIRouter(prefix="/api/registrations", tags=["uncertainty"])
 class UnknownMotionOut(BaseModel):
     """A motion of the object that depth cannot tell from none."""
 
-    kind: Literal["other mode", "free motion"]
-    motion: Literal["turn", "shift"]
+    kind: Kind
+    motion: Motion
     axis: tuple[float, float, float] = Field(description="Direction in the world.")
     extent: float = Field(
         description="Radians or metres: where the mode lies; how far to either side (95 %)."
     )
+    text: str = Field(description="As people read it, beside the name of what the 3-D view draws of it.")
 
 
 class UncertaintyOut(BaseModel):
@@ -45,8 +45,14 @@ def get_uncertainty(seat: SeatDep, services: ServicesDep) -> UncertaintyOut:
     if known is None:
         return UncertaintyOut(snap_id=None, translation=None, rotation=None, unknown=[])
     unknown = [
-        UnknownMotionOut(kind=one.kind, motion=one.motion, axis=one.axis.tolist(), extent=one.extent)
-        for one in known.unknown
+        UnknownMotionOut(
+            kind=one.kind,
+            motion=one.motion,
+            axis=one.axis.tolist(),
+            extent=one.extent,
+            text=sentence(drawn, one, one.axis_name),
+        )
+        for drawn, one in zip(names_of_drawn(known.unknown), known.unknown, strict=True)
     ]
     return UncertaintyOut(
         snap_id=snap_id, translation=known.translation, rotation=known.rotation, unknown=unknown

@@ -19,6 +19,7 @@ from app.export.visibility import Mask, appearance, is_before_camera
 from app.storage import FileStore
 from registration_core import ObjectModel, pose
 from registration_core.bop import read_depth
+from registration_core.bop_images import JPEG_FORMATS, is_grey
 from registration_core.bop_writer import camera_entry, camera_file, gt_entry, write_image, write_json
 
 Progress = Callable[[float, str], None]
@@ -26,9 +27,6 @@ Progress = Callable[[float, str], None]
 
 LEAST_VISIBLE_TARGET = 0.1
 """Share of an instance that must be visible to make it a target of the BOP challenge."""
-
-JPEG_FORMATS = ("JPEG", "MPO")
-GREY_MODES = ("L", "I;16", "I")
 
 
 class ModelCache:
@@ -85,6 +83,7 @@ class SceneWriter:
         self._cameras: dict[int, Any] = {}
         self._truths: dict[int, list[Any]] = {}
         self._infos: dict[int, list[Any]] = {}
+        self._color_folder = color_folder(scene, files)
         self._coco = CocoScene(
             selection.name,
             scene.split,
@@ -113,9 +112,8 @@ class SceneWriter:
             return f"depth/{image.image_id:06d}.png"
         source = self._files.path(image.color_hash)
         with Image.open(source) as picture:
-            kind = "gray" if picture.mode in GREY_MODES else "rgb"
             suffix = ".jpg" if picture.format in JPEG_FORMATS else ".png"
-        file_name = f"{kind}/{image.image_id:06d}{suffix}"
+        file_name = f"{self._color_folder}/{image.image_id:06d}{suffix}"
         copy_file(source, self._folder / file_name)
         return file_name
 
@@ -163,6 +161,16 @@ class SceneWriter:
                 for obj_id, count in sorted(counts.items())
             ]
         return targets
+
+
+def color_folder(scene: ExportScene, files: FileStore) -> str:
+    """Where a scene's pictures go, all of them together: to `gray` only where each of them is grey."""
+    for image in scene.images:
+        if image.color_hash is not None:
+            with Image.open(files.path(image.color_hash)) as picture:
+                if not is_grey(picture):
+                    return "rgb"
+    return "gray"
 
 
 def copy_file(source: Path, target: Path) -> None:

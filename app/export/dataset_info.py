@@ -64,13 +64,13 @@ def several_submissions(selection: Selection) -> str:
             for annotation in image.annotations
         }
         rows += [
-            f"| {scene.folder} | {image_id} | {found.obj_id} | {found.instance} | {found.candidates} |"
+            f"| {scene.folder} | {image_id} | {found.obj_id} | {found.name} | {found.candidates} |"
             for image_id, found in sorted(annotated.values(), key=lambda pair: (pair[0], pair[1].obj_id))
             if found.candidates > 1
         ]
     if not rows:
         return "None: every annotation is the only one submitted."
-    head = "| scene | first image | obj_id | instance | submitted |\n|---|---|---|---|---|\n"
+    head = "| scene | first image | obj_id | object | submitted |\n|---|---|---|---|---|\n"
     return (
         "The newest is exported; one made in accurate mode goes before quick ones.\n\n"
         + head

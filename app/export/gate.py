@@ -5,19 +5,21 @@ Nothing here calls the code that writes exports: files are read anew and poses r
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.export.gate_instance import GateError, Instance, check_instance, read_mask
+from app.export.gate_instance import GateError, Instance, MisplacedError, check_instance, read_mask
 from app.export.raycasting import RayCaster
 from app.export.selection import Selection
+from app.export.strict_ply import read_triangles
 from registration_core import pose
 from registration_core.bop import BopDataset, BopFormatError, BopImage, BopScene, read_dataset, read_depth
+from registration_core.bop_fields import METRES_PER_MILLIMETRE
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
@@ -32,14 +34,47 @@ READING_SHARE = 0.3
 """Part of the gate's time that reading takes."""
 
 
+class ExpectedObject(NamedTuple):
+    """What the database knows of an object instance."""
+
+    registration_id: int
+    obj_id: int
+    T_world_object: Array
+    """(4, 4), metres."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An object instance that did not pass, in the first image that shows it."""
+
+    registration_id: int
+    split: str
+    scene_id: int
+    image_id: int
+    where: str
+    """The place in words."""
+    reason: str
+    """A sentence without it."""
+
+
+class ObjectsError(GateError):
+    """Everything is right but for some objects, which the rest does not depend on."""
+
+    def __init__(self, failures: Sequence[Failure]) -> None:
+        self.failures = tuple(failures)
+        first = self.failures[0]
+        others = f" (and {len(failures) - 1} more)" if len(failures) > 1 else ""
+        super().__init__(f"{first.where}: {first.reason}{others}")
+
+
 @dataclass(frozen=True, eq=False)
 class ExpectedImage:
     """What the database knows of an image."""
 
     T_world_camera: Array | None
     """(4, 4), metres; None where the world is the camera."""
-    objects: tuple[tuple[int, Array], ...]
-    """`obj_id` and `T_world_object` of each annotation, in order."""
+    objects: tuple["ExpectedObject", ...]
+    """Its annotations, in order."""
 
 
 Expected = Mapping[tuple[str, int, int], ExpectedImage]
@@ -51,7 +86,10 @@ def expected_images(selection: Selection) -> Expected:
     return {
         (scene.split, scene.scene_id, image.image_id): ExpectedImage(
             image.T_world_camera if image.posed else None,
-            tuple((found.obj_id, found.T_world_object) for found in image.annotations),
+            tuple(
+                ExpectedObject(found.registration_id, found.obj_id, found.T_world_object)
+                for found in image.annotations
+            ),
         )
         for scene in selection.scenes
         for image in scene.images
@@ -62,7 +100,8 @@ def check_export(root: Path, expected: Expected, progress: Progress) -> None:
     """Read a dataset folder back and compare it with the database and with a new rendering of every pose.
 
     Raises:
-        GateError: at the first thing that is wrong, in a sentence that names scene, image and object.
+        ObjectsError: where all is right but for some objects.
+        GateError: at the first thing else that is wrong, in a sentence that names scene, image and object.
     """
     try:
         dataset = read_dataset(root, lambda share, what: progress(READING_SHARE * share, f"reading {what}"))
@@ -71,16 +110,20 @@ def check_export(root: Path, expected: Expected, progress: Progress) -> None:
     check_images(dataset, expected)
     check_models(root, dataset)
     caster = RayCaster(dataset.objects)
+    failures: dict[int, Failure] = {}
     done = 0
     for scene in dataset.scenes:
         check = SceneCheck(root, scene, caster)
         for image in scene.images:
             share = READING_SHARE + (1.0 - READING_SHARE) * done / len(expected)
             progress(share, f"checking {check.name}, image {image.image_id}")
-            check.image(image, expected[scene.split, scene.scene_id, image.image_id])
+            for failure in check.image(image, expected[scene.split, scene.scene_id, image.image_id]):
+                failures.setdefault(failure.registration_id, failure)
             done += 1
         check.mask_files()
     check_targets(root, dataset)
+    if failures:
+        raise ObjectsError(list(failures.values()))
 
 
 def check_images(dataset: BopDataset, expected: Expected) -> None:
@@ -94,13 +137,29 @@ def check_images(dataset: BopDataset, expected: Expected) -> None:
 
 
 def check_models(root: Path, dataset: BopDataset) -> None:
-    """Raise where `models_info.json` or `models_eval` lacks an object."""
+    """Raise where an object is missing, or the strictest readers cannot read its mesh."""
     infos = load_json(root / "models" / "models_info.json")
     for found in dataset.objects:
         if str(found.obj_id) not in infos:
             raise GateError(f"models/models_info.json: object {found.obj_id} is missing")
-        if not (root / "models_eval" / found.mesh_path.name).is_file():
-            raise GateError(f"models_eval/{found.mesh_path.name} of object {found.obj_id} is missing")
+        corners = {}
+        for folder in ("models", "models_eval"):
+            corners[folder] = mesh_triangles(root / folder / found.mesh_path.name, found.obj_id)
+        expected = found.model.vertices[found.model.faces] / METRES_PER_MILLIMETRE
+        read = corners["models"]
+        if read.shape != expected.shape or not np.allclose(read, expected, rtol=1e-5, atol=1e-3):
+            raise GateError(f"models/{found.mesh_path.name} does not hold the triangles of its object")
+
+
+def mesh_triangles(path: Path, obj_id: int) -> Array:
+    """The triangles (F, 3, 3) of an object's mesh file, mm; raise where it is missing or not plain."""
+    name = f"{path.parent.name}/{path.name} of object {obj_id}"
+    try:
+        return read_triangles(path)
+    except FileNotFoundError as error:
+        raise GateError(f"{name} is missing") from error
+    except ValueError as error:
+        raise GateError(f"{name}: {error}") from error
 
 
 def check_targets(root: Path, dataset: BopDataset) -> None:
@@ -125,6 +184,7 @@ class SceneCheck:
     """Checks one scene folder, an image at a time."""
 
     def __init__(self, root: Path, scene: BopScene, caster: RayCaster) -> None:
+        self._scene = scene
         self.name = f"{scene.split}/{scene.scene_id:06d}"
         self._folder = root / self.name
         self._caster = caster
@@ -134,19 +194,20 @@ class SceneCheck:
             self._coco.setdefault(annotation["image_id"], []).append(annotation)
         self._mask_names: set[str] = set()
 
-    def image(self, image: BopImage, expected: ExpectedImage) -> None:
-        """Check an image's camera, annotations and masks."""
+    def image(self, image: BopImage, expected: ExpectedImage) -> list[Failure]:
+        """Check an image's camera, annotations and masks; returns the objects that do not pass."""
         where = f"{self.name}, image {image.image_id}"
         check_camera(image, expected, where)
-        self._check_truths(image, expected, where)
+        wanted = self._check_truths(image, expected, where)
         truths = image.ground_truth or ()
         infos = self._infos.get(str(image.image_id), [])
         if len(infos) != len(truths):
             raise GateError(
                 f"{where}: scene_gt_info.json has {len(infos)} entries, scene_gt.json {len(truths)}"
             )
-        depth = read_depth(image.depth_path, image.depth_scale)
+        depth = read_depth(image.depth.path, image.depth_scale)
         coco = iter(self._coco.get(image.image_id, []))
+        failures = []
         for index, (truth, info) in enumerate(zip(truths, infos, strict=True)):
             instance_name = f"{where}, object {truth.obj_id} (entry {index})"
             file_name = f"{image.image_id:06d}_{index:06d}.png"
@@ -159,28 +220,43 @@ class SceneCheck:
                 info,
                 next(coco, None) if info["px_count_visib"] else None,
             )
-            check_instance(instance, self._caster, image.camera, truth.T_camera_object, depth)
+            try:
+                check_instance(instance, self._caster, image.camera, truth.T_camera_object, depth)
+            except MisplacedError as error:
+                failures.append(
+                    Failure(
+                        wanted[index].registration_id,
+                        self._scene.split,
+                        self._scene.scene_id,
+                        image.image_id,
+                        instance_name,
+                        error.reason,
+                    )
+                )
         if next(coco, None) is not None:
             raise GateError(f"{where}: scene_gt_coco.json has more instances than are visible")
+        return failures
 
-    def _check_truths(self, image: BopImage, expected: ExpectedImage, where: str) -> None:
-        """Raise where the annotations are not the database's, poses composed by way of the camera's."""
+    def _check_truths(self, image: BopImage, expected: ExpectedImage, where: str) -> list[ExpectedObject]:
+        """The database's annotations that are in the image; raise where the file's are others."""
         T_world_camera = np.eye(4) if image.T_world_camera is None else image.T_world_camera
         T_camera_world = pose.inverse(T_world_camera)
         wanted = [
-            (obj_id, T)
-            for obj_id, T in expected.objects
-            if self._caster.nearest_and_farthest(obj_id, T_camera_world @ T)[1] > NEAR
+            found
+            for found in expected.objects
+            if self._caster.nearest_and_farthest(found.obj_id, T_camera_world @ found.T_world_object)[1]
+            > NEAR
         ]
         truths = image.ground_truth or ()
         if len(truths) != len(wanted):
             raise GateError(f"{where}: scene_gt.json has {len(truths)} objects, the database {len(wanted)}")
-        for index, (truth, (obj_id, T_world_object)) in enumerate(zip(truths, wanted, strict=True)):
+        for index, (truth, found) in enumerate(zip(truths, wanted, strict=True)):
             entry = f"{where}, object {truth.obj_id} (entry {index})"
-            if truth.obj_id != obj_id:
-                raise GateError(f"{entry}: obj_id is {truth.obj_id}, in the database {obj_id}")
-            T_camera_object = T_camera_world @ T_world_object
+            if truth.obj_id != found.obj_id:
+                raise GateError(f"{entry}: obj_id is {truth.obj_id}, in the database {found.obj_id}")
+            T_camera_object = T_camera_world @ found.T_world_object
             check_pose(truth.T_camera_object, T_camera_object, f"{entry}: cam_R_m2c and cam_t_m2c")
+        return wanted
 
     def mask_files(self) -> None:
         """Raise where there is a mask without an annotation; called after the last image."""

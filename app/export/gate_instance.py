@@ -43,6 +43,14 @@ class GateError(Exception):
     """An export is wrong; the message is one sentence that names scene, image and object."""
 
 
+class MisplacedError(GateError):
+    """The object is not where the depth image shows it; `reason` says so without its place."""
+
+    def __init__(self, where: str, reason: str) -> None:
+        super().__init__(f"{where}: {reason}")
+        self.reason = reason
+
+
 @dataclass(frozen=True, eq=False)
 class Instance:
     """What the files say of one object instance in one image."""
@@ -165,9 +173,10 @@ def check_residual(instance: Instance, rendered: Depth, observed: Depth) -> None
         return
     residual = float(np.median(np.abs(rendered[measured] - observed[measured])))
     if residual > LARGEST_RESIDUAL:
-        raise GateError(
-            f"{instance.where}: the surface in this pose is {1000 * residual:.0f} mm off the measured depth"
-            f" (median; at most {1000 * LARGEST_RESIDUAL:.0f} mm); register the object again"
+        raise MisplacedError(
+            instance.where,
+            f"the surface in this pose is {1000 * residual:.0f} mm off the measured depth"
+            f" (median; at most {1000 * LARGEST_RESIDUAL:.0f} mm); register the object again",
         )
 
 

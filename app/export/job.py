@@ -1,6 +1,5 @@
 """Export jobs: write, check, pack; an export that fails serves nothing and leaves nothing half-written."""
 
-import errno
 import logging
 import os
 import re
@@ -12,15 +11,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sqlalchemy import select
+from sqlalchemy.orm import joinedload
+
 from app.database import Database
 from app.export.archive import pack
-from app.export.bop_dataset import write_dataset
-from app.export.gate import check_export, expected_images
+from app.export.bop_dataset import ModelCache, write_dataset
+from app.export.failure_picture import failure_picture
+from app.export.gate import Failure, ObjectsError, check_export, expected_images
 from app.export.gate_instance import GateError
 from app.export.interaction_log import write_interaction_log
-from app.export.selection import ExportError, Selection, select_dataset
-from app.storage import FileStore
-from app.tables import Export
+from app.export.results_csv import write_results
+from app.export.selection import EVERYTHING, Choice, ExportError, Selection, select_dataset
+from app.storage import DamagedFileError, FileStore
+from app.storage_faults import advice
+from app.tables import NAMED, Export, Format, Registration
+from app.unfinished import unfinished
+from registration_core import pose
 
 log = logging.getLogger(__name__)
 
@@ -46,24 +53,42 @@ class ExportSummary:
 
 
 def export_dataset(
-    database: Database, files: FileStore, dataset_id: int, target: Path, progress: Progress
+    database: Database,
+    files: FileStore,
+    dataset_id: int,
+    target: Path,
+    progress: Progress,
+    export_format: Format = "bop",
+    choice: Choice = EVERYTHING,
 ) -> ExportSummary:
     """Write, check and pack a dataset; `target` is a zip file if it ends in .zip, else a new folder.
 
     The target appears whole or not at all; a zip that is there is replaced.
 
+    Args:
+        database: That holds the dataset.
+        files: That hold its images and meshes.
+        dataset_id: Of the dataset.
+        target: What is written.
+        progress: Told how far it is.
+        export_format: "bop", the whole dataset, or "csv", its poses alone, which went through the same gate.
+        choice: Which part of the dataset.
+
     Raises:
         ExportError: where nothing can be exported or the target folder exists.
+        ObjectsError: where some objects are not where the depth images show them.
         GateError: where what was written is wrong.
     """
     if target.suffix != ".zip" and target.exists():
         raise ExportError(f"{target} exists; choose another folder")
     with database.read() as session:
-        selection = select_dataset(session, dataset_id)
+        selection = select_dataset(session, dataset_id, choice)
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary_folder(target.parent / f".{target.name}.part") as work:
         folder = work / folder_name(selection)
         write_checked(database, files, selection, folder, progress)
+        if export_format == "csv":
+            folder = only_results(folder, work)
         if target.suffix == ".zip":
             packed = work / "packed.zip"
             pack(folder, packed, part(progress, CHECKING, 1.0, "packing"))
@@ -75,14 +100,44 @@ def export_dataset(
     return ExportSummary(folder.name, len(selection.scenes), images, len(selection.annotations))
 
 
+def only_results(folder: Path, work: Path) -> Path:
+    """A folder of the same name with the poses of a checked dataset alone."""
+    kept = work / "results" / folder.name
+    kept.mkdir(parents=True)
+    write_results(folder, kept / f"{folder.name}-poses.csv")
+    return kept
+
+
 def write_checked(
     database: Database, files: FileStore, selection: Selection, folder: Path, progress: Progress
 ) -> None:
     """Write a dataset with its interaction log into a new folder, and send it through the gate."""
+    lost = out_of_reach(selection)
+    if lost:
+        raise ObjectsError(lost)
     write_dataset(selection, files, folder, scaled(progress, 0.0, WRITING))
     with database.read() as session:
         write_interaction_log(session, selection.dataset_id, folder / "interaction_log")
     check_export(folder, expected_images(selection), scaled(progress, WRITING, CHECKING))
+
+
+def out_of_reach(selection: Selection) -> list[Failure]:
+    """Objects so far away that nothing can be computed of them."""
+    found: dict[int, Failure] = {}
+    for scene in selection.scenes:
+        for image in scene.images:
+            for annotation in image.annotations:
+                if not pose.is_within_reach(annotation.T_world_object):
+                    failure = Failure(
+                        annotation.registration_id,
+                        scene.split,
+                        scene.scene_id,
+                        image.image_id,
+                        f"{scene.folder}, image {image.image_id}, object {annotation.obj_id}",
+                        "the pose is out of all reach; register the object again",
+                    )
+                    found.setdefault(annotation.registration_id, failure)
+    return list(found.values())
 
 
 def run_job(database: Database, files: FileStore, export_id: int) -> bool:
@@ -92,31 +147,84 @@ def run_job(database: Database, files: FileStore, export_id: int) -> bool:
         Whether it succeeded.
 
     Raises:
-        ExportError: where there is no such export, or it is not waiting to be done.
+        ExportError: where there is no such export, it is not waiting to be done, or it was ended meanwhile.
     """
-    dataset_id = begin_job(database, export_id)
-    packed = files.root / f"export-{export_id}.zip"
-    packed.parent.mkdir(parents=True, exist_ok=True)
+    export = begin_job(database, export_id)
+    files.root.mkdir(parents=True, exist_ok=True)
     try:
         report = ProgressReport(database, export_id)
-        summary = export_dataset(database, files, dataset_id, packed, report)
-        file_hash = files.adopt(packed)
+        with unfinished(files.root) as work:
+            packed = work / "export.zip"
+            summary = export_dataset(
+                database, files, export.dataset_id, packed, report, export.format, choice_of(export)
+            )
+            file_hash = files.adopt(packed)
         message = (
             f"Scenes: {summary.scenes}, images: {summary.images}, annotated objects: {summary.annotations}."
         )
         update_job(database, export_id, state="done", progress=1.0, message=message, file_hash=file_hash)
     except BaseException as error:
-        packed.unlink(missing_ok=True)
         message = sentence(error)[:LONGEST_MESSAGE]
-        update_job(database, export_id, state="failed", message=message)
+        failures = told_failures(database, files, export, error) if isinstance(error, ObjectsError) else []
+        update_job(database, export_id, state="failed", message=message, failures=failures)
         if not isinstance(error, Exception):
             raise
         return False
     return True
 
 
-def begin_job(database: Database, export_id: int) -> int:
-    """Mark an export as running and return the id of its dataset."""
+def choice_of(export: Export) -> Choice:
+    """The part of its dataset that an export was asked for."""
+    scene_ids = export.choice["scene_ids"]
+    return Choice(None if scene_ids is None else frozenset(scene_ids), frozenset(export.choice["without"]))
+
+
+def told_failures(
+    database: Database, files: FileStore, export: Export, error: ObjectsError
+) -> list[dict[str, Any]]:
+    """What people are told of objects that did not pass: which they are, whose, why, and a picture each."""
+    with database.read() as session:
+        selection = select_dataset(session, export.dataset_id, choice_of(export))
+        rows = {
+            row.id: row
+            for row in session.scalars(
+                select(Registration)
+                .where(Registration.id.in_([failure.registration_id for failure in error.failures]))
+                .options(
+                    joinedload(Registration.user),
+                    joinedload(Registration.task).options(*NAMED),
+                )
+            )
+        }
+    models = ModelCache(files, selection.objects)
+    images = {
+        (scene.split, scene.scene_id, image.image_id): image
+        for scene in selection.scenes
+        for image in scene.images
+    }
+    told = []
+    for failure in error.failures:
+        row = rows[failure.registration_id]
+        image = images[failure.split, failure.scene_id, failure.image_id]
+        annotation = next(a for a in image.annotations if a.registration_id == row.id)
+        picture = failure_picture(image, annotation, models[annotation.obj_id], files)
+        told.append(
+            {
+                "registration_id": row.id,
+                "task_id": row.task_id,
+                "object": row.task.name,
+                "operator": row.user.name,
+                "scene": f"{failure.split}/{failure.scene_id:06d}",
+                "image_id": failure.image_id,
+                "reason": failure.reason,
+                "picture_hash": files.put_bytes(picture),
+            }
+        )
+    return told
+
+
+def begin_job(database: Database, export_id: int) -> Export:
+    """Mark an export as running and return it."""
     with database.write() as session:
         export = session.get(Export, export_id)
         if export is None:
@@ -124,13 +232,19 @@ def begin_job(database: Database, export_id: int) -> int:
         if export.state != "queued":
             raise ExportError(f"export {export_id} is {export.state}; only a queued export can be started")
         export.state = "running"
-        return export.dataset_id
+        return export
 
 
 def update_job(database: Database, export_id: int, **values: Any) -> None:
-    """Change fields of an export's row."""
+    """Change fields of the row of a running export.
+
+    Raises:
+        ExportError: where it does not run any more: a server that took it for dead has said how it ended.
+    """
     with database.write() as session:
         export = session.get_one(Export, export_id)
+        if export.state != "running":
+            raise ExportError(f"export {export_id} is {export.state} already; start another one")
         for field, value in values.items():
             setattr(export, field, value)
 
@@ -138,10 +252,10 @@ def update_job(database: Database, export_id: int, **values: Any) -> None:
 def sentence(error: BaseException) -> str:
     """What an export's row says about its failure; a failure nobody foresaw is logged with its trace."""
     match error:
-        case ExportError() | GateError():
+        case ExportError() | GateError() | DamagedFileError():
             return str(error)
-        case OSError(errno=errno.ENOSPC):
-            return "the disk is full; free some space, then export again"
+        case Exception() if known := advice(error):
+            return known
         case Exception():
             log.error("export failed", exc_info=error)
             return (

@@ -1,5 +1,6 @@
 """The folders `models` and `models_eval` of a BOP dataset, from the stored meshes."""
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,12 +8,14 @@ import numpy as np
 import open3d as o3d
 import trimesh
 from numpy.typing import NDArray
+from PIL import Image
 
 from app.export.selection import ExportObject
 from app.storage import FileStore
 from registration_core import ObjectModel
+from registration_core.bop_images import JPEG_FORMATS
 from registration_core.bop_writer import model_info, write_json, write_mesh
-from registration_core.object_model import read_mesh
+from registration_core.mesh_file import plain_ply, read_mesh
 
 Array = NDArray[np.float64]
 
@@ -44,12 +47,23 @@ def write_models(folder: Path, objects: Sequence[ExportObject], files: FileStore
 
 
 def write_full_mesh(path: Path, export_object: ExportObject, files: FileStore) -> None:
-    """Write the mesh as it was imported, or as PLY where it is of another format."""
+    """Write the whole mesh as every tool reads it, with its texture's picture beside it."""
     content = files.read(export_object.mesh_hash)
-    if export_object.mesh_format != "ply":
-        content = read_mesh(content, export_object.mesh_format).export(file_type="ply")
+    texture = files.read(export_object.texture_hash) if export_object.texture_hash else None
+    mesh = read_mesh(content, export_object.mesh_format, texture)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
+    if texture is None or mesh.visual.kind != "texture":
+        path.write_bytes(plain_ply(mesh))
+        return
+    picture = path.with_suffix(picture_suffix(texture))
+    picture.write_bytes(texture)
+    path.write_bytes(plain_ply(mesh, picture.name))
+
+
+def picture_suffix(content: bytes) -> str:
+    """The ending of a stored picture's name."""
+    with Image.open(io.BytesIO(content)) as picture:
+        return ".jpg" if picture.format in JPEG_FORMATS else ".png"
 
 
 def evenly_sampled(model: ObjectModel) -> trimesh.Trimesh:

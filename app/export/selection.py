@@ -12,7 +12,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session, contains_eager, joinedload
 
 from app.scene_data import camera_of, symmetries_from_json
-from app.tables import OUTSIDE_STUDIES, Dataset, Frame, Object, Registration, Scene, Task
+from app.tables import ENDED_BY, NAMED, OUTSIDE_STUDIES, Dataset, Frame, Object, Registration, Scene, Task
 from registration_core import Intrinsics, Symmetries
 
 Array = NDArray[np.float64]
@@ -34,14 +34,32 @@ class ExportObject:
     mesh_hash: str
     mesh_format: str
     symmetries: Symmetries
+    texture_hash: str | None = None
+    """Of the mesh's picture, where it has one."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which part of a dataset is exported."""
+
+    scene_ids: frozenset[int] | None = None
+    """Rows of `Scene`; None for all."""
+    without: frozenset[int] = frozenset()
+    """Registrations that are left out."""
+
+
+EVERYTHING = Choice()
 
 
 @dataclass(frozen=True, eq=False)
 class Annotation:
     """The pose kept of one instance of an object."""
 
+    registration_id: int
     obj_id: int
     instance: int
+    name: str
+    """Of its task."""
     T_world_object: Array
     """(4, 4), metres."""
     candidates: int
@@ -108,8 +126,8 @@ class Selection:
         return max(annotation.submitted_at for annotation in self.annotations)
 
 
-def select_dataset(session: Session, dataset_id: int) -> Selection:
-    """Choose what an export of a dataset holds.
+def select_dataset(session: Session, dataset_id: int, choice: Choice = EVERYTHING) -> Selection:
+    """Choose what an export of a dataset, or of a part of it, holds.
 
     Raises:
         ExportError: where there is no such dataset, nothing is submitted in it, or two of its images would
@@ -118,10 +136,11 @@ def select_dataset(session: Session, dataset_id: int) -> Selection:
     dataset = session.get(Dataset, dataset_id)
     if dataset is None:
         raise ExportError(f"dataset {dataset_id} does not exist")
-    annotations = select_annotations(session, dataset_id)
+    annotations = select_annotations(session, dataset_id, choice)
     if not annotations:
         raise ExportError(
-            f"dataset {dataset.name!r} has no submitted registration; submit at least one, then export again"
+            f"dataset {dataset.name!r} has no submitted registration{part_of(choice)}; submit at least one,"
+            " then export again"
         )
     objects = session.scalars(
         select(Object).where(Object.dataset_id == dataset_id).order_by(Object.obj_id)
@@ -160,15 +179,29 @@ def count_skipped(
     return tuple(sorted(counts.items()))
 
 
-def select_annotations(session: Session, dataset_id: int) -> dict[int, tuple[Annotation, ...]]:
+def part_of(choice: Choice) -> str:
+    """Words for messages that say of which part of a dataset they speak."""
+    return "" if choice == EVERYTHING else " in the chosen part"
+
+
+def select_annotations(
+    session: Session, dataset_id: int, choice: Choice
+) -> dict[int, tuple[Annotation, ...]]:
     """By scene: one annotation for each instance that somebody submitted, in order of obj_id and instance."""
+    wanted = [] if choice.scene_ids is None else [Scene.id.in_(choice.scene_ids)]
     registrations = session.scalars(
         select(Registration)
         .join(Registration.task)
         .join(Task.scene)
         .join(Task.object)
-        .where(Scene.dataset_id == dataset_id, Registration.state == SUBMITTED, OUTSIDE_STUDIES)
-        .options(contains_eager(Registration.task).joinedload(Task.object))
+        .where(
+            Scene.dataset_id == dataset_id,
+            Registration.state == SUBMITTED,
+            Registration.id.not_in(choice.without),
+            OUTSIDE_STUDIES,
+            *wanted,
+        )
+        .options(ENDED_BY, contains_eager(Registration.task).options(*NAMED))
         .order_by(Task.scene_id, Object.obj_id, Task.instance, Registration.id)
     ).all()
     annotations: dict[int, list[Annotation]] = {}
@@ -185,11 +218,16 @@ def instance_key(registration: Registration) -> tuple[int, int, int]:
 
 def annotation_of(registrations: Sequence[Registration]) -> Annotation:
     """The newest submitted registration of an instance; one made accurately goes before a quick one."""
-    kept = max(registrations, key=lambda row: (row.task.mode == ACCURATE, row.submitted_at, row.id))
+    kept = max(
+        registrations,
+        key=lambda row: (row.task.mode == ACCURATE, row.ended_by or 0, row.submitted_at, row.id),
+    )
     assert kept.T_world_object is not None and kept.submitted_at is not None
     return Annotation(
+        kept.id,
         kept.task.object.obj_id,
         kept.task.instance,
+        kept.task.name,
         np.array(kept.T_world_object, dtype=np.float64),
         len(registrations),
         kept.submitted_at,
@@ -238,7 +276,12 @@ def first_duplicate(values: Iterable[int]) -> int | None:
 def export_object(row: Object) -> ExportObject:
     """An object of the database."""
     return ExportObject(
-        row.obj_id, row.name, row.mesh_hash, row.mesh_format, symmetries_from_json(row.symmetries)
+        row.obj_id,
+        row.name,
+        row.mesh_hash,
+        row.mesh_format,
+        symmetries_from_json(row.symmetries),
+        row.texture_hash,
     )
 
 

@@ -4,12 +4,13 @@ All words about it stand here; pages show them as they are.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.labeling.ambiguity_words import ANY_TURN, amount, axis_name, millimetres, reach
 from registration_core import Ambiguity, Check, Estimate, ObjectModel, Recalibration
 from registration_core.certificates import MOST_OFF, NOTHING
 
@@ -18,12 +19,6 @@ Assessed = Literal["accept", "look", "doubt"]
 
 EVEN = 0.5
 """Below this a pose is more likely wrong than right."""
-LEAST_DIFFERENT = 1.1
-"""Ratio of two sides of the bounding box from which on one can be told to be the longer."""
-ALONG = np.cos(np.radians(20.0))
-"""Cosine from which on an axis is that of a side of the box."""
-ANY_TURN = np.radians(60.0)
-"""Standard deviation of a free turn from which on nothing is known about it."""
 NUMBERS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}
 
 
@@ -128,14 +123,15 @@ def _ambiguous(ambiguities: tuple[Ambiguity, ...], model: ObjectModel) -> list[s
         count = NUMBERS.get(1 + len(modes), str(1 + len(modes)))
         verb = "turned by" if modes[0].motion == "turn" else "shifted by"
         one = "" if len(modes) == 1 else "one of them "
-        reasons.append(f"{count} poses fit, {one}{verb} {_amount(modes[0])} {_axis(modes[0], model)}")
-    for motion in ambiguities[len(modes) :]:
+        reasons.append(f"{count} poses fit, {one}{verb} {amount(modes[0])} {_axis(modes[0], model)}")
+    for free in ambiguities[len(modes) :]:
+        motion = replace(free, extent=reach(free.kind, free.motion, free.extent))
         if motion.motion == "shift":
-            where = f"where it lies {_axis(motion, model)}, ± {_amount(motion)}"
+            where = f"where it lies {_axis(motion, model)}, ± {amount(motion)}"
         elif motion.extent >= ANY_TURN:
             where = f"the turn {_axis(motion, model)}"
         else:
-            where = f"the turn {_axis(motion, model)}, ± {_amount(motion)}"
+            where = f"the turn {_axis(motion, model)}, ± {amount(motion)}"
         reasons.append(f"depth does not tell {where}")
     return reasons
 
@@ -153,30 +149,8 @@ def _unlikely(confidence: float, standard: Standard) -> list[str]:
 
 
 def _axis(ambiguity: Ambiguity, model: ObjectModel) -> str:
-    """Names an axis by the object's bounding box."""
     preposition = "about" if ambiguity.motion == "turn" else "along"
-    sizes = np.ptp(model.vertices, axis=0)
-    along = np.abs(np.array(ambiguity.axis))
-    side = int(np.argmax(along))
-    if along[side] < ALONG:
-        return f"{preposition} a slanted axis"
-    others = np.delete(sizes, side)
-    if sizes[side] > LEAST_DIFFERENT * others.max():
-        return f"{preposition} the long axis"
-    if LEAST_DIFFERENT * sizes[side] < others.min():
-        return f"{preposition} the short axis"
-    return f"{preposition} the {'xyz'[side]} axis"
-
-
-def _amount(ambiguity: Ambiguity) -> str:
-    if ambiguity.motion == "turn":
-        return f"{np.degrees(ambiguity.extent):.0f}°"
-    return millimetres(ambiguity.extent)
-
-
-def millimetres(metres: float) -> str:
-    """A length as people read it."""
-    return f"{1000.0 * metres:.0f} mm"
+    return f"{preposition} {axis_name(ambiguity.axis, np.ptp(model.vertices, axis=0))}"
 
 
 def percent(share: float) -> str:

@@ -20,6 +20,11 @@ class Chair:
         self._outdated: set[str] = set()
         self._lock = threading.Lock()
 
+    @property
+    def is_taken(self) -> bool:
+        """Whether a page is there now."""
+        return self._sitter is not None
+
     def sit(self, page: str, give_way: Callable[[], None]) -> Callable[[], None]:
         """Take the place; whoever had it is told to give way, unless it is the same page that came back.
 

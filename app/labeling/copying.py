@@ -15,8 +15,8 @@ from sqlalchemy.orm import joinedload
 from app.auth import Identity, Role
 from app.database import Database
 from app.event_log import EventLog
-from app.labeling.history import Step, replay
-from app.tables import OUTSIDE_STUDIES, Frame, Registration, Scene, Task
+from app.labeling.history import PosedBy, Step, replay
+from app.tables import NAMED, OUTSIDE_STUDIES, Frame, Registration, Scene, Task
 from registration_core import pose
 
 MOST_COPIES = 20
@@ -32,6 +32,7 @@ class Copy:
     """(4, 4), in the world that it is copied into."""
     confidence: float | None
     """Of the estimate that the pose stems from; None where a person set it."""
+    posed_by: PosedBy
     is_neighbour: bool
     """Whether it comes from another frame, not from another operator."""
 
@@ -54,17 +55,18 @@ def copies_for(
         neighbours = [] if task.frame.posed else session.scalars(_neighbours(identity, task)).unique().all()
     for source in colleagues:
         if (now := _pose_now(source, log)) is not None:
-            yield Copy(source, now.T_world_object, now.confidence, is_neighbour=False)
+            yield Copy(source, now.T_world_object, now.confidence, now.posed_by, is_neighbour=False)
     for source in neighbours:
         if (now := _pose_now(source, log)) is not None:
             T_camera_object = pose.inverse(np.array(source.task.frame.T_world_camera)) @ now.T_world_object
             T_world_object = np.array(task.frame.T_world_camera) @ T_camera_object
-            yield Copy(source, T_world_object, now.confidence, is_neighbour=True)
+            yield Copy(source, T_world_object, now.confidence, now.posed_by, is_neighbour=True)
 
 
 def _registrations(identity: Identity, task: Task) -> Select[Registration]:
     query = select(Registration).options(
         joinedload(Registration.user),
+        joinedload(Registration.task).options(*NAMED),
         joinedload(Registration.task).joinedload(Task.frame),
         joinedload(Registration.task).joinedload(Task.scene),
     )

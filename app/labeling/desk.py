@@ -4,6 +4,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -25,12 +26,11 @@ from app.labeling.session_state import SessionState
 from app.labeling.snap_frames import FramesOfScene
 from app.labeling.tools import is_trial
 from app.labeling.uncertainty import Uncertainty, uncertainty_of
-from app.memory import give_back
 from app.registration_rows import whole_registration
 from app.scene_data import SceneData, camera_of
 from app.snapping import Snapper
 from app.standards import Standards
-from app.tables import Condition, EstimateRow, Method, Object, Registration, Task
+from app.tables import Condition, EstimateRow, Method, Object, Participant, Registration, Task
 
 logger = logging.getLogger(__name__)
 
@@ -65,9 +65,11 @@ class Desk:
         """This user's registration of a task: begun, or gone on with.
 
         Raises:
-            NotFoundError: where there is no such task.
+            NotFoundError: where there is no such task, or the user has withdrawn from their study.
         """
         with self._database.write() as session:
+            if session.scalar(select(Participant.withdrawn_at).filter_by(user_id=identity.user_id)):
+                raise NotFoundError("You have withdrawn from the study.")  # while the request was on its way
             if session.get(Task, task_id) is None:
                 raise NotFoundError(f"There is no task {task_id}.")
             registration = session.scalar(
@@ -86,6 +88,10 @@ class Desk:
         Raises:
             NotFoundError: where there is none, or it is another user's.
         """
+        with self._lock:
+            is_live = registration_id in self._seats
+        if not is_live:  # a large mesh takes seconds, in which others are not to wait for the lock
+            self._data.model(self._owned(registration_id, identity).task.object)
         with self._lock:
             seat = self._seats.get(registration_id)
             if seat is None:
@@ -121,14 +127,15 @@ class Desk:
         if estimate is None:
             return None
         T_world_camera = np.array(seat.frames[estimate.frame_id].T_world_camera)
-        return uncertainty_of(estimate, T_world_camera, seat.model.centre)
+        sides = np.ptp(seat.model.vertices, axis=0)
+        return uncertainty_of(estimate, T_world_camera, seat.model.centre, sides)
 
-    def view_port(self, seat: Seat) -> int:
-        """The loopback port of a session's view, which is made where there is none."""
+    def view_socket(self, seat: Seat) -> Path:
+        """The socket file of a session's view, which is made where there is none."""
         with seat.lock:
             if seat.view is None:
                 seat.view = view_of(seat, self._data, lambda snap_id: self.uncertainty(seat, snap_id))
-            return seat.view.port
+            return seat.view.socket_path
 
     def watch(self, seat: Seat) -> Callable[[], None]:
         """Keep a session alive until the returned function is called."""
@@ -141,6 +148,16 @@ class Desk:
 
         return leave
 
+    def at_work(self) -> frozenset[int]:
+        """The registrations that somebody has before them in a page now."""
+        with self._lock:
+            return frozenset(number for number, seat in self._seats.items() if seat.chair.is_taken)
+
+    def tell_others(self, seat: Seat) -> None:
+        """Tell the others who are at a task that somebody came or went."""
+        for other in self._others(seat.registration):
+            other.session.tell()
+
     def leave(self, user_id: int) -> None:
         """Close the sessions of a user who may not go on."""
         with self._lock:
@@ -148,10 +165,12 @@ class Desk:
             for seat in theirs:
                 del self._seats[seat.registration.id]
         for seat in theirs:
-            seat.close()
+            _close(seat)
 
     def renew_object(self, object_id: int) -> None:
         """Let the sessions of an object go on with its present symmetries, and tell them."""
+        with self._database.read() as session:
+            self._data.model(session.get_one(Object, object_id))  # before the lock, as in `seat`
         with self._lock:
             with self._database.read() as session:
                 row = session.get_one(Object, object_id)
@@ -172,9 +191,7 @@ class Desk:
             for seat in idle:
                 del self._seats[seat.registration.id]
         for seat in idle:
-            seat.close()
-        if idle:
-            give_back()
+            _close(seat)
         return len(idle)
 
     def close(self) -> None:
@@ -182,7 +199,7 @@ class Desk:
         with self._lock:
             seats, self._seats = list(self._seats.values()), {}
         for seat in seats:
-            seat.close()
+            _close(seat)
 
     def _owned(self, registration_id: int, identity: Identity) -> Registration:
         registration = whole_registration(self._database, registration_id)
@@ -237,7 +254,23 @@ class Desk:
             return DepthView(self._data.depth(frame), camera_of(frame), np.array(frame.T_world_camera))
 
         reading = DepthReading(lambda: self._data.thinned_model(task.object), depth_view)
-        return Seat(registration, session, frames, sought, neighbours, reading)
+        textured = self._data.textured(task.object)
+
+        def names_of_others() -> tuple[str, ...]:
+            there = (other for other in self._others(registration) if other.chair.is_taken)
+            return tuple(sorted(other.registration.user.name for other in there))
+
+        return Seat(registration, session, frames, sought, neighbours, reading, textured, names_of_others)
+
+    def _others(self, registration: Registration) -> list[Seat]:
+        """The other live sessions of a task; who takes part in a study neither has any nor is one."""
+        if is_trial(registration):
+            return []
+        with self._lock:
+            there = [
+                seat for seat in self._seats.values() if seat.registration.task_id == registration.task_id
+            ]
+        return [s for s in there if s.registration.id != registration.id and not is_trial(s.registration)]
 
     def _renew_scene(self, scene_id: int) -> None:
         """Tell all who work in a scene that something in it was submitted, skipped or reopened."""
@@ -248,6 +281,13 @@ class Desk:
                 seat.neighbours.renew()
             except Exception:  # what happened is on the disk, whoever cannot be told of it
                 logger.exception("registration %d was not told of its scene", seat.registration.id)
+
+
+def _close(seat: Seat) -> None:
+    try:
+        seat.close()
+    except Exception:  # the disk is full, perhaps: the others are closed all the same
+        logger.exception("registration %d: the end of its session was not written down", seat.registration.id)
 
 
 def _not_found(registration_id: int) -> NotFoundError:

@@ -122,7 +122,9 @@ class Dispatch:
         explained = self._neighbours.explained(frame, order.known)
         camera, T_world_camera = camera_of(frame), np.array(frame.T_world_camera)
         T_camera_object = pose.inverse(T_world_camera) @ order.T_world_object
-        whole, color = self._data.depth(frame), self._data.aligned_color(frame)
+        whole = self._data.depth(frame)
+        is_searched = frame.id in order.frames.used  # others only check what is found, by their depth
+        color = self._data.aligned_color(frame) if is_searched else None
         try:
             left, top, width, height = region_of_interest(model, camera, T_camera_object, order.config)
         except ValueError as error:

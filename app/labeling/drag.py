@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
+from registration_core import pose
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,9 @@ class Drag:
         self.T_now = T_world_object
 
     def move(self, T_world_object: Array) -> None:
-        """The object is here now."""
+        """The object is here now; out of reach, it stays where it was."""
+        if not pose.is_within_reach(T_world_object):
+            return
         self.T_now = T_world_object
         self._path.append([round(self._now() - self._began, 4), *_path_row(T_world_object)])
 

@@ -6,8 +6,9 @@ from app.auth import Actor
 from app.event_log import NewEvent
 from app.labeling.degrees_of_freedom import GizmoAxes, degrees_of_freedom
 from app.labeling.drag import Drag
-from app.labeling.history import Step
+from app.labeling.history import Step, poser
 from app.labeling.track import ActionError, Array, Track
+from app.storage_faults import told
 
 
 class Hand:
@@ -42,7 +43,7 @@ class Hand:
         try:
             track.push(event, Step(drag.T_now, dragged=True))
         except Exception as error:
-            track.message = f"The last drag could not be saved and was taken back: {error}"
+            track.message = f"The last drag could not be saved and was taken back: {told(error)}."
             raise
         return True
 
@@ -57,7 +58,7 @@ class Hand:
             dof=degrees_of_freedom(before, T_world_object, self._track.pivot),
             detail=dict(detail),
         )
-        self._track.push(event, Step(T_world_object))
+        self._track.push(event, Step(T_world_object, posed_by=poser(event.kind, detail)))
 
     def reset(self, actor: Actor) -> None:
         """Put the object back to where it began."""

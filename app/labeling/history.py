@@ -1,8 +1,8 @@
 """The poses a registration went through, with undo and redo: a pure function of its events."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,14 @@ from app.labeling.assessment import Assessment, assessment_in
 
 NEW_POSE_KINDS = frozenset({"drag", "set_pose", "snap_applied", "accept", "reset"})
 """Events that put a new pose on top, and with it end what could be redone."""
+
+
+PosedBy = Literal["start", "human", "machine"]
+"""Whose a pose is: "start" where the object began."""
+
+MACHINE_KINDS = frozenset({"snap_applied", "accept"})
+FOUND_BY_MACHINE = frozenset({"proposal", "mode"})
+"""Techniques of `set_pose` by which an operator takes what the machine has found."""
 
 
 class LoggedEvent(Protocol):
@@ -40,6 +48,7 @@ class Step:
     """Of the estimate that the pose stems from."""
     assessment: Assessment | None = None
     """What was thought of that estimate; None also where an older version did not say."""
+    posed_by: PosedBy = "human"
 
 
 @dataclass(frozen=True)
@@ -81,16 +90,41 @@ class History:
 
 def replay(T_start: NDArray[np.float64], events: Iterable[LoggedEvent]) -> History:
     """The history that the events of a registration amount to, in their order."""
-    history = History((Step(T_start),))
+    history = start(T_start)
     for event in events:
-        if event.kind == "undo":
-            history = history.undone()
-        elif event.kind == "redo":
-            history = history.redone()
-        elif event.kind in NEW_POSE_KINDS:
-            confidence = event.detail.get("confidence")
-            T = np.array(event.T_after, dtype=np.float64)
-            known = None if confidence is None else float(str(confidence))
-            thought = assessment_in(event.detail)
-            history = history.pushed(Step(T, known, event.kind == "drag", event.snap_id, thought))
+        history = after(history, event)
     return history
+
+
+def start(T_start: NDArray[np.float64]) -> History:
+    """The history before anything was done."""
+    return History((Step(T_start, posed_by="start"),))
+
+
+def after(history: History, event: LoggedEvent) -> History:
+    """The history with one more event."""
+    if event.kind == "undo":
+        return history.undone()
+    if event.kind == "redo":
+        return history.redone()
+    if event.kind not in NEW_POSE_KINDS:
+        return history
+    confidence = event.detail.get("confidence")
+    return history.pushed(
+        Step(
+            np.array(event.T_after, dtype=np.float64),
+            None if confidence is None else float(str(confidence)),
+            event.kind == "drag",
+            event.snap_id,
+            assessment_in(event.detail),
+            poser(event.kind, event.detail),
+        )
+    )
+
+
+def poser(kind: str, detail: Mapping[str, object]) -> PosedBy:
+    """Whose the pose is that an event of this kind and detail leads to."""
+    if kind == "reset":
+        return "start"
+    found = kind in MACHINE_KINDS or detail.get("technique") in FOUND_BY_MACHINE
+    return "machine" if found else "human"

@@ -9,6 +9,8 @@ class Layers:
 
     cloud: bool = True
     mesh: bool = True
+    texture: bool = True
+    """The mesh in its own colours, where it has any; otherwise in the operator's."""
     fine: bool = True
     """All measured points; otherwise a few large ones, which are drawn soon without a graphics card, too."""
     agreement: bool = False

@@ -25,7 +25,8 @@ def view_of(seat: Seat, data: SceneData, uncertainty: TellUncertainty) -> SceneV
     state = session.snapshot()
     frame = seat.frames[state.frame_id]
     drag = DragHandlers(session.start_drag, session.drag_to, session.end_drag)
-    view = SceneView(seat.model, state.T_world_object, first_view_of(frame, data.depth(frame)), drag)
+    first_view = first_view_of(frame, data.depth(frame))
+    view = SceneView(seat.model, state.T_world_object, first_view, drag, data.drawable, seat.textured)
     view.watch_camera(CameraWatch(session.look_from))
     shown = _Shown(view, data, seat.frames, uncertainty)
     shown.update(state)

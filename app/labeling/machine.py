@@ -32,6 +32,7 @@ from app.labeling.start_spread import StartSpread, Unsaid, spread_from_drags
 from app.labeling.tools import Tool, require, require_frames, require_method
 from app.labeling.track import ActionError, Array, Track, said_of
 from app.methods import method_of
+from app.storage_faults import told
 from app.tables import FrameUse, Method
 from registration_core import SnapConfig
 
@@ -185,10 +186,15 @@ class Machine:
         self.status = replace(self.status, state="cancelled")
 
     def close(self) -> None:
-        """Stop whatever is under way, for good."""
-        self.abandon(Actor.MACHINE, "session closed")
+        """Stop whatever is under way, for good, also where that cannot be written down."""
         self._live.is_on = False
         self._live.rest()
+        try:
+            self.abandon(Actor.MACHINE, "session closed")
+        except Exception:
+            assert self._cancel is not None
+            self._cancel()
+            raise
 
     def accept(self, actor: Actor) -> None:
         """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
@@ -248,7 +254,7 @@ class Machine:
             else:
                 self._take(order, then, outcome)
         except Exception as error:
-            message = f"The result could not be saved: {error}"
+            message = f"The result could not be saved: {told(error)}."
             self.status = replace(self.status, state="failed", message=message)
             raise
 
@@ -319,4 +325,5 @@ class Machine:
 
 
 def _step(T_world_object: Array, assessment: Assessment, snap_id: str) -> Step:
-    return Step(T_world_object, assessment.confidence, snap_id=snap_id, assessment=assessment)
+    confidence = assessment.confidence
+    return Step(T_world_object, confidence, snap_id=snap_id, assessment=assessment, posed_by="machine")

@@ -1,6 +1,6 @@
 """The things of a scene that are done, in the 3-D view: meshes in colours of their own, with their names."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ import viser
 from scipy.spatial.transform import Rotation
 
 from app.labeling.scene_things import Thing
-from registration_core import pose
+from registration_core import ObjectModel, pose
 
 OPACITY = 0.75
 SHELL = 0.003
@@ -28,10 +28,16 @@ class _Shown:
 
 
 class NeighbourView:
-    """Draws things into a viser server and takes them away again; they have no gizmo."""
+    """Draws things into a viser server and takes them away again; they have no gizmo.
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    Args:
+        server: Where to.
+        drawable: Gives an object's mesh as it is to be drawn, in few enough faces.
+    """
+
+    def __init__(self, server: viser.ViserServer, drawable: Callable[[ObjectModel], ObjectModel]) -> None:
         self._server = server
+        self._drawable = drawable
         self._shown: dict[int, _Shown] = {}
 
     def show(self, things: Sequence[Thing]) -> None:
@@ -50,7 +56,8 @@ class NeighbourView:
     def _draw(self, thing: Thing) -> _Shown:
         assert thing.known is not None
         model, T = thing.known.model, thing.known.T_world_object
-        mesh = trimesh.Trimesh(model.vertices, model.faces)
+        drawn = self._drawable(model)
+        mesh = trimesh.Trimesh(drawn.vertices, drawn.faces)
         handle = self._server.scene.add_mesh_simple(
             f"/neighbours/{thing.task_id}",
             vertices=(mesh.vertices + SHELL * mesh.vertex_normals).astype(np.float32),

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from sqlalchemy import select
-from sqlalchemy.orm import joinedload, selectinload, undefer
+from sqlalchemy.orm import selectinload
 
 from app.database import Database
 from app.labeling.snap_exchange import KnownObject
 from app.labeling.tools import is_trial
 from app.scene_data import SceneData
-from app.tables import OUTSIDE_STUDIES, Registration, Task
+from app.tables import ENDED_BY, NAMED, OUTSIDE_STUDIES, Registration, Task
 
 COLORS = ("#2fb98a", "#f2e35e", "#cf7fbb", "#d3d7dc", "#8f7cf0", "#a5843c")
 """They differ in lightness, for those who cannot tell hues, and none is the human's or the machine's."""
@@ -53,11 +53,6 @@ def things_of_scene(database: Database, data: SceneData, registration: Registrat
     )
 
 
-def name_of(task: Task) -> str:
-    """ "mug", or "mug #2" where there are several; `Task.instances` has to be loaded."""
-    return f"{task.object.name} #{task.instance + 1}" if task.instances > 1 else task.object.name
-
-
 def _tasks(database: Database, registration: Registration) -> Sequence[Task]:
     own = registration.task
     if is_trial(registration):
@@ -69,9 +64,8 @@ def _tasks(database: Database, registration: Registration) -> Sequence[Task]:
             select(Task)
             .where(wanted)
             .options(
-                joinedload(Task.object),
-                selectinload(Task.registrations.and_(counted)),
-                undefer(Task.instances),
+                *NAMED,
+                selectinload(Task.registrations.and_(counted)).options(ENDED_BY),
             )
             .order_by(Task.id)
         ).all()
@@ -87,7 +81,7 @@ def _thing(tasks: list[Task], own: Task, user_id: int, color: str, data: SceneDa
         known = KnownObject(done.id, task.object_id, T_world_object, data.model(task.object))
     return Thing(
         task_id=task.id,
-        name=name_of(task),
+        name=task.name,
         is_current=is_current,
         state=done.state if done else "open",
         skip_reason=done.skip_reason if done else None,
@@ -100,6 +94,6 @@ def _newest(done: list[Registration], user_id: int) -> Registration | None:
     """Mine goes before others', a pose before none, and the newest before older ones."""
     return max(
         done,
-        key=lambda r: (r.user_id == user_id, r.state == "submitted", r.submitted_at or r.created_at),
+        key=lambda r: (r.user_id == user_id, r.state == "submitted", r.ended_by or 0, r.id),
         default=None,
     )

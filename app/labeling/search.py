@@ -11,6 +11,7 @@ from app.event_log import NewEvent
 from app.labeling.snap_exchange import KnownObject, SnapFailure, SnapStatus, stored_known
 from app.labeling.tools import Tool, require
 from app.labeling.track import Track
+from app.storage_faults import told
 from registration_core import Hypothesis, SnapConfig
 
 Region = tuple[int, int, int, int]
@@ -133,7 +134,7 @@ class Search:
         try:
             self._track.record(_outcome_event(order, outcome))
         except Exception as error:
-            message = f"The candidates could not be saved: {error}"
+            message = f"The candidates could not be saved: {told(error)}."
             self.status = replace(self.status, state="failed", message=message)
             raise
         if isinstance(outcome, SnapFailure):

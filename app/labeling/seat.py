@@ -1,7 +1,10 @@
 """One live session with all that belongs to it."""
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
+
+import trimesh
 
 from app.labeling.chair import Chair
 from app.labeling.depth_reading import DepthReading
@@ -23,6 +26,10 @@ class Seat:
     object: SessionObject
     neighbours: Neighbours
     reading: DepthReading
+    textured: trimesh.Trimesh | None
+    """The object in its own colours, metres, where it has any."""
+    others: Callable[[], tuple[str, ...]]
+    """Names of those who have the same task before them now, each on a registration of their own."""
     view: SceneView | None = None
     watchers: int = 0
     """Open pages and streams."""
@@ -38,7 +45,9 @@ class Seat:
 
     def close(self) -> None:
         """End the session, and its view with it."""
-        self.session.close()
-        with self.lock:
-            if self.view is not None:
-                self.view.close()
+        try:
+            self.session.close()
+        finally:
+            with self.lock:
+                if self.view is not None:
+                    self.view.close()

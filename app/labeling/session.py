@@ -6,6 +6,7 @@ viser, the web or the workers: the session is handed plain functions.
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +148,7 @@ class LabelingSession:
                 T_world_object=track.T_world_object,
                 confidence=None if track.drag else history.current.confidence,
                 assessment=None if track.drag else history.current.assessment,
+                posed_by="human" if track.drag else history.current.posed_by,
                 can_undo=self._is_open and history.can_undo,
                 can_redo=self._is_open and history.can_redo,
                 dragging=track.drag is not None,
@@ -409,10 +411,10 @@ class LabelingSession:
 
     def close(self) -> None:
         """End the session, cancelling a snap under way. What was recorded stays, and can be gone on with."""
-        with self._turns.alone:
-            self._machine.close()
-            self._search.abandon(Actor.MACHINE, "session closed")
-            self._turns.end()
+        with self._turns.alone, ExitStack() as ends:  # each of them, whatever becomes of the others
+            ends.callback(self._turns.end)
+            ends.callback(self._search.abandon, Actor.MACHINE, "session closed")
+            ends.callback(self._machine.close)
 
     def tell(self) -> None:
         """Tell the listeners the state once more: something beside it has changed."""

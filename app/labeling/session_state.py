@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from app.labeling.assessment import Assessment
 from app.labeling.degrees_of_freedom import GizmoAxes
+from app.labeling.history import PosedBy
 from app.labeling.layers import Layers
 from app.labeling.snap_exchange import Offer, SnapStatus
 from app.tables import FrameUse, Method
@@ -28,6 +29,7 @@ class SessionState:
     confidence: float | None
     assessment: Assessment | None
     """Of the estimate that the pose stems from."""
+    posed_by: PosedBy
     can_undo: bool
     can_redo: bool
     dragging: bool

@@ -1,22 +1,19 @@
 """What is not known about an estimated pose: how far off it may be, and what depth cannot tell."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
+from app.labeling.ambiguity_words import SHARE, Kind, Motion, axis_name, reach
 from app.tables import Pose
 
 Array = NDArray[np.float64]
 
-SHARE = 0.95
-"""Of the belief that lies within what is told."""
 REACH = float(np.sqrt(chi2.ppf(SHARE, df=3)))
 """Standard deviations, in space."""
-REACH_ALONG = float(norm.ppf(0.5 + SHARE / 2.0))
-"""Standard deviations, along one axis."""
 
 
 class EstimateLike(Protocol):
@@ -34,12 +31,13 @@ class EstimateLike(Protocol):
 class UnknownMotion:
     """A motion of the object that depth cannot tell from none."""
 
-    kind: Literal["other mode", "free motion"]
-    motion: Literal["turn", "shift"]
+    kind: Kind
+    motion: Motion
     axis: Array
     """(3,), direction in the world."""
     extent: float
     """Radians or metres: where another mode lies, or how far to either side a free motion reaches."""
+    axis_name: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +58,14 @@ class Uncertainty:
         return float(np.linalg.norm(self.ellipsoid, axis=0).max())
 
 
-def uncertainty_of(estimate: EstimateLike, T_world_camera: Array, centre: Array) -> Uncertainty:
+def uncertainty_of(estimate: EstimateLike, T_world_camera: Array, centre: Array, sides: Array) -> Uncertainty:
     """What an estimate says of its own pose.
 
     Args:
         estimate: Its covariance (6, 6) is in camera axes: the translation of the origin, then the turn.
         T_world_camera: (4, 4), of the frame that it was made with.
         centre: (3,), the middle of the object in its mesh's frame, metres.
+        sides: (3,), of its bounding box there, metres.
     """
     T_world_object = np.array(estimate.T_world_object)
     R_world_camera = T_world_camera[:3, :3]
@@ -81,16 +80,15 @@ def uncertainty_of(estimate: EstimateLike, T_world_camera: Array, centre: Array)
         centre=T_world_object[:3, :3] @ centre + T_world_object[:3, 3],
         ellipsoid=REACH * axes * np.sqrt(np.maximum(variances, 0.0)),
         rotation=min(np.pi, REACH * float(np.sqrt(max(turns[-1], 0.0)))),
-        unknown=tuple(_unknown(entry, T_world_object[:3, :3]) for entry in estimate.ambiguities or ()),
+        unknown=tuple(_unknown(entry, T_world_object[:3, :3], sides) for entry in estimate.ambiguities or ()),
     )
 
 
-def _unknown(entry: dict[str, Any], R_world_object: Array) -> UnknownMotion:
-    free = entry["kind"] == "free motion"
-    extent = entry["extent"] * (REACH_ALONG if free else 1.0)
+def _unknown(entry: dict[str, Any], R_world_object: Array, sides: Array) -> UnknownMotion:
     return UnknownMotion(
         kind=entry["kind"],
         motion=entry["motion"],
         axis=R_world_object @ np.array(entry["axis"]),
-        extent=min(extent, np.pi) if entry["motion"] == "turn" else extent,
+        extent=reach(entry["kind"], entry["motion"], entry["extent"]),
+        axis_name=axis_name(entry["axis"], sides),
     )

@@ -5,6 +5,7 @@ import viser
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from app.labeling.ambiguity_words import names_of_drawn
 from app.labeling.uncertainty import Uncertainty, UnknownMotion
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ LINE_WIDTH = 3.0
 OPACITY = 0.45
 RADIANS_A_PIECE = 0.1
 LABEL_SCALE = 0.8
-"""Of the numbers of axes."""
+"""Of the names of motions."""
 
 
 class UncertaintyView:
@@ -57,7 +58,8 @@ class UncertaintyView:
             lines = [lines_of(motion, uncertainty.centre, self._diameter) for motion in uncertainty.unknown]
             self._nodes.append(self._add_lines(np.concatenate(lines)))
         if len(uncertainty.unknown) > 1:  # or nobody could tell which is which
-            self._nodes += [self._add_number(n, line[0, 1]) for n, line in enumerate(lines, start=1)]
+            names = names_of_drawn(uncertainty.unknown)
+            self._nodes += [self._add_name(name, line[0, 1]) for name, line in zip(names, lines, strict=True)]
 
     def _add_ellipsoid(self, uncertainty: Uncertainty) -> viser.IcosphereHandle:
         lengths = np.linalg.norm(uncertainty.ellipsoid, axis=0)
@@ -76,9 +78,9 @@ class UncertaintyView:
             receive_shadow=False,
         )
 
-    def _add_number(self, number: int, at: Array) -> viser.LabelHandle:
+    def _add_name(self, name: str, at: Array) -> viser.LabelHandle:
         return self._scene.add_label(
-            f"/uncertainty/axis-{number}", f"axis {number}", position=at, font_screen_scale=LABEL_SCALE
+            f"/uncertainty/{name.replace(' ', '-')}", name, position=at, font_screen_scale=LABEL_SCALE
         )
 
     def _add_lines(self, segments: Array) -> viser.LineSegmentsHandle:

@@ -3,20 +3,25 @@
 import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import trimesh
 import viser
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from viser import _messages
 
 from app.labeling.camera_watch import Camera, CameraWatch
+from app.labeling.cloud_view import CloudView
 from app.labeling.degrees_of_freedom import GizmoAxes
 from app.labeling.layers import Layers
 from app.labeling.marks import draw_marks
 from app.labeling.neighbour_view import NeighbourView
 from app.labeling.uncertainty_view import UncertaintyView
+from app.labeling.view_socket import ViewSocket
 from app.labeling.viewpoint import Viewpoint
+from app.textured_mesh import as_glb
 from registration_core import ObjectModel, pose
 
 Array = NDArray[np.float64]
@@ -40,8 +45,6 @@ STEP_BACK = 1.15
 FIELD_OF_VIEW_LIMITS = (0.5, 1.3)
 """Radians, vertical."""
 BACKGROUND = (24, 27, 33)
-COARSE_POINTS = 20_000
-"""Of a cloud that is not fine: software draws some 700,000 points a second."""
 
 
 @dataclass(frozen=True)
@@ -66,33 +69,30 @@ class FirstView:
     """From the sensor to what there is to see, metres."""
 
 
-@dataclass(frozen=True)
-class _Measured:
-    """What `SceneView.show_cloud` was given."""
-
-    points: NDArray[np.float32]
-    colors: NDArray[np.uint8]
-    point_size: float
-
-    def coarse(self) -> "_Measured":
-        """At most `COARSE_POINTS` of it, at random, as large as to cover what all of them cover."""
-        count = len(self.points)
-        if count <= COARSE_POINTS:
-            return self
-        chosen = np.random.default_rng(0).choice(count, COARSE_POINTS, replace=False)
-        return _Measured(
-            self.points[chosen], self.colors[chosen], self.point_size * float(np.sqrt(count / COARSE_POINTS))
-        )
-
-
 class SceneView:
-    """One viser server on the loopback, for one session; what it shows survives a reload of the page."""
+    """One viser server of its own, for one session; what it shows survives a reload of the page.
+
+    Args:
+        model: The object.
+        T_world_object: Where it is at first, (4, 4), metres.
+        first_view: Where the camera stands at first.
+        drag: Told of drags.
+        drawable: Gives an object's mesh as it is to be drawn, in few enough faces.
+        textured: The object's mesh in its own colours, metres, where it has any.
+    """
 
     def __init__(
-        self, model: ObjectModel, T_world_object: Array, first_view: FirstView, drag: DragHandlers
+        self,
+        model: ObjectModel,
+        T_world_object: Array,
+        first_view: FirstView,
+        drag: DragHandlers,
+        drawable: Callable[[ObjectModel], ObjectModel],
+        textured: trimesh.Trimesh | None = None,
     ) -> None:
         self._T_gizmo_object = pose.from_rotation_translation(np.eye(3), -model.centre)
-        self._server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        self._socket = ViewSocket()
+        self._server = self._socket.server()
         _refuse_sharing(self._server)
         self._server.gui.configure_theme(
             show_logo=False, show_share_button=False, dark_mode=True, control_layout="floating"
@@ -100,35 +100,39 @@ class SceneView:
         self._server.scene.set_background_image(np.full((1, 1, 3), BACKGROUND, dtype=np.uint8))
         self._place_camera(first_view)
         self._model = model
+        self._drawn = drawable(model)
         self._ghost: viser.MeshHandle | None = None
         self.uncertainty = UncertaintyView(self._server, MACHINE_COLOR, model.diameter)
-        self._measured: _Measured | None = None
-        self._cloud: viser.PointCloudHandle | None = None
+        self._cloud = CloudView(self._server, model.diameter)
+        self._cloud.follow(pose.apply(T_world_object, model.centre))
         self._on_object: viser.PointCloudHandle | None = None
-        self._layers = Layers()
         self._watch: CameraWatch | None = None
         self._gizmo, self._mesh = self._add_object(T_world_object)
-        self.neighbours = NeighbourView(self._server)
+        self._textured = None if textured is None else self._add_textured(textured)
+        self.show_layers(Layers())
+        self.neighbours = NeighbourView(self._server, drawable)
         self._follow_drags(drag)
 
     @property
-    def port(self) -> int:
-        """The loopback port that the view is served on."""
-        return self._server.get_port()
+    def socket_path(self) -> Path:
+        """The socket file that the view is served on."""
+        return self._socket.path
 
     def show_cloud(self, points: NDArray[np.float32], colors: NDArray[np.uint8], point_size: float) -> None:
         """Show a point cloud (N, 3) in the world, metres, in place of the one before."""
-        self._measured = _Measured(points, colors, point_size)
-        self._draw_cloud(self._measured)
+        self._cloud.show(points, colors, point_size)
 
     def show_layers(self, layers: Layers) -> None:
-        """Show or hide cloud and mesh, and what lies on the mesh with it; the gizmo stays."""
-        before, self._layers = self._layers, layers
-        self._mesh.visible = layers.mesh
-        if self._measured is not None and layers.fine != before.fine:
-            self._draw_cloud(self._measured)
-        if self._cloud is not None:
-            self._cloud.visible = layers.cloud
+        """Show or hide cloud and mesh, and what lies on the mesh with it; the gizmo stays.
+
+        Where the object's own colours are shown, how depth agrees is not: two looks would hide each other.
+        """
+        is_textured = self._textured is not None and layers.texture and not layers.agreement
+        with self._server.atomic():
+            self._mesh.visible = layers.mesh and not is_textured
+            if self._textured is not None:
+                self._textured.visible = layers.mesh and is_textured
+        self._cloud.show_as(layers.cloud, layers.fine)
 
     def show_on_object(self, points: Array, colors: NDArray[np.uint8]) -> None:
         """Show points (N, 3) in the object's frame, metres, in place of those before; the mesh has them."""
@@ -154,12 +158,15 @@ class SceneView:
         rotation = T_world_object[:3, :3]
         of_gizmo, of_mesh = (rotation, np.eye(3)) if gizmo_axes == "object" else (np.eye(3), rotation)
         centre = self._model.centre
+        self._cloud.follow(pose.apply(T_world_object, centre))
         T_world_gizmo = pose.from_rotation_translation(of_gizmo, pose.apply(T_world_object, centre))
         # Not by the inverse of the one times the other: what rounding leaves would double with every drag.
         self._T_gizmo_object = pose.from_rotation_translation(of_mesh, -of_mesh @ centre)
         with self._server.atomic():
             self._gizmo.position, self._gizmo.wxyz = _to_viser(T_world_gizmo)
             _, self._mesh.wxyz = _to_viser(self._T_gizmo_object)
+            if self._textured is not None:
+                self._textured.wxyz = self._mesh.wxyz
 
     @property
     def viewpoint(self) -> Viewpoint | None:
@@ -227,18 +234,7 @@ class SceneView:
         if self._watch is not None:
             self._watch.close()
         self._server.stop()
-
-    def _draw_cloud(self, measured: "_Measured") -> None:
-        drawn = measured if self._layers.fine else measured.coarse()
-        self._cloud = self._server.scene.add_point_cloud(
-            "/cloud",
-            drawn.points,
-            drawn.colors,
-            point_size=drawn.point_size,
-            point_shape="circle",
-            precision="float32",
-            visible=self._layers.cloud,
-        )
+        self._socket.close()
 
     def _note_camera(self, camera: viser.CameraHandle) -> None:
         now = _logged(camera)
@@ -268,13 +264,21 @@ class SceneView:
         )
         return gizmo, self._add_mesh("/object/mesh", HUMAN_COLOR, MESH_OPACITY)
 
+    def _add_textured(self, mesh: trimesh.Trimesh) -> viser.GlbHandle:
+        return self._server.scene.add_glb(
+            "/object/textured",
+            as_glb(mesh, self._model.centre),
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
     def _add_mesh(
         self, name: str, color: tuple[int, int, int], opacity: float, size: float = 1.0
     ) -> viser.MeshHandle:
         return self._server.scene.add_mesh_simple(
             name,
-            vertices=(size * (self._model.vertices - self._model.centre)).astype(np.float32),
-            faces=self._model.faces,
+            vertices=(size * (self._drawn.vertices - self._model.centre)).astype(np.float32),
+            faces=self._drawn.faces,
             color=color,
             opacity=opacity,
             side="double",

@@ -16,7 +16,7 @@ router = APIRouter(include_in_schema=False)
 @router.get("/view/replay/{registration_id}/{path:path}")
 async def replay_view_page(path: str, request: Request, replay: ReplayDep) -> Response:
     """A file of the view's page."""
-    return await fetched(request, replay.view.port, path)
+    return await fetched(request, replay.view.socket_path, path)
 
 
 @router.websocket("/view/replay/{registration_id}/")
@@ -29,7 +29,7 @@ async def replay_view_socket(socket: WebSocket, registration_id: Id) -> None:
         return
     leave = get_services(socket).replays.watch(replay)
     try:
-        await join(socket, replay.view.port)
+        await join(socket, replay.view.socket_path)
     finally:
         leave()
 

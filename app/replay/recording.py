@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from app.analysis.trace import LoggedEvent, Span, Trace, moves, trace_of
 from app.clock import SIMULATED
 from app.labeling.assessment import Assessment, assessment_in
+from app.labeling.history import PosedBy, after, start
 from app.labeling.viewpoint import Viewpoint, facing
 from app.tables import Pose
 
@@ -49,6 +50,7 @@ class Moment:
     """Of the estimate that the pose stems from; None where a person set it."""
     assessment: Assessment | None
     """What was thought of that estimate."""
+    posed_by: PosedBy
     frame_id: int
     ghost: Ghost | None
     viewpoint: Viewpoint | None
@@ -70,9 +72,12 @@ class Recording:
         self._frames = _Steps(frame_id)
         self._confidences: _Steps[float | None] = _Steps(None)
         self._assessments: _Steps[Assessment | None] = _Steps(None)
+        self._posers: _Steps[PosedBy] = _Steps("start")
         self._ghosts: _Steps[Ghost | None] = _Steps(None)
         cameras: list[tuple[Span, Array]] = []
+        history = start(np.array(T_world_object_start))
         for event, span in zip(events, self.trace.spans, strict=True):
+            history = after(history, event)
             if event.kind == "frame":
                 self._frames.set(span.end, event.detail["frame_id"])
             if event.kind == "view":
@@ -81,6 +86,7 @@ class Recording:
                 moved = span.start if event.path else span.end
                 self._confidences.set(moved, event.detail.get("confidence"))
                 self._assessments.set(moved, assessment_in(event.detail))
+                self._posers.set(moved, history.current.posed_by)
             self._note_ghost(event, span)
         self._cameras = _camera_knots(cameras)
 
@@ -95,6 +101,7 @@ class Recording:
             T_world_object=self.trace.motion.at([seconds])[0],
             confidence=self._confidences.at(seconds),
             assessment=self._assessments.at(seconds),
+            posed_by=self._posers.at(seconds),
             frame_id=self._frames.at(seconds),
             ghost=self._ghosts.at(seconds),
             viewpoint=self._viewpoint_at(seconds),

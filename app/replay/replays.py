@@ -13,7 +13,6 @@ from app.event_log import EventLog
 from app.labeling.desk import NotFoundError
 from app.labeling.frame_view import first_view_of, show_cloud_of
 from app.labeling.view import DragHandlers, SceneView
-from app.memory import give_back
 from app.registration_rows import whole_registration
 from app.replay.recording import Moment, Recording
 from app.scene_data import SceneData
@@ -134,8 +133,6 @@ class Replays:
             closed = [self._replays.pop(key) for key in idle]
         for replay in closed:
             replay.view.close()
-        if closed:
-            give_back()
         return len(closed)
 
     def close(self) -> None:
@@ -150,7 +147,7 @@ class Replays:
         first_view = first_view_of(task.frame, self._data.depth(task.frame))
         T_start = np.array(task.T_world_object_start)
         model = self.model(registration)
-        view = SceneView(model, T_start, first_view, NO_DRAGS)
+        view = SceneView(model, T_start, first_view, NO_DRAGS, self._data.drawable)
         view.lock_object(True)
         return Replay(recording, model, {frame.id: frame for frame in task.scene.frames}, view)
 

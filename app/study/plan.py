@@ -1,7 +1,7 @@
 """What a study asks of whom, and the order in which each operator does it."""
 
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any, TypeVar
@@ -30,6 +30,11 @@ ACCURATELY = (
 QUICKLY = (
     "Place the object as quickly as you can. Submit as soon as it looks about right; a clock is running."
 )
+
+
+MINUTES_A_TASK: Mapping[Mode, float] = {"accurate": 2.0, "quick": 1.0}
+"""Assumed before a study begins: simulated operators, who move at published speeds, take 107 s and 52 s by
+hand (medians on the demo scenes), and there is the way to the next task. A pilot tells better."""
 
 
 class StudyError(ValueError):
@@ -88,6 +93,11 @@ class TaskRef(_Part):
         return f"scene {self.scene_id}, object {self.object_id}, instance {self.instance}"
 
 
+DECLINED = "Rather not say"
+"""Offered beside the choices of an optional question. A form cannot take a choice back, and what is left
+empty may have been overlooked: whoever wants to tell nothing can say so, which is told from both."""
+
+
 class Question(_Part):
     """What participants are asked once, before they begin."""
 
@@ -95,6 +105,36 @@ class Question(_Part):
     choices: Annotated[list[Line], Once, AfterValidator(_two_or_none)] = Field(
         [], max_length=20, description="None: a short free answer."
     )
+    optional: bool = Field(
+        False, description=f"May be left empty; where there are choices, {DECLINED!r} is offered, too."
+    )
+
+    @property
+    def offered(self) -> list[str]:
+        """The choices that participants see."""
+        adds = self.optional and self.choices and DECLINED not in self.choices
+        return [*self.choices, DECLINED] if adds else self.choices
+
+    def checked(self, given: str) -> str | None:
+        """An answer as it is kept; None where it was left empty.
+
+        Raises:
+            StudyError: where the question has to be answered, or has no such choice.
+        """
+        answer = given.strip()
+        if not answer:
+            if self.optional:
+                return None
+            raise StudyError(f"please answer {self.text!r}")
+        if self.offered and answer not in self.offered:
+            choices = ", ".join(self.offered)
+            raise StudyError(f"{answer!r} is no answer to {self.text!r}; choose one of {choices}")
+        return answer
+
+
+def _each_asked_once(questions: list[Question]) -> list[Question]:
+    _without_repetition([question.text for question in questions])
+    return questions
 
 
 class StudyPlan(_Part):
@@ -117,7 +157,7 @@ class StudyPlan(_Part):
         "", description="What participants agree to first; nothing is asked where it is empty."
     )
     instructions: dict[Mode, Text] = Field({"accurate": ACCURATELY, "quick": QUICKLY})
-    questions: list[Question] = Field([], max_length=30)
+    questions: Annotated[list[Question], AfterValidator(_each_asked_once)] = Field([], max_length=30)
     break_after: int = Field(6, ge=0, le=LONGEST_ORDER, description="Tasks between two breaks; 0: none.")
 
     @model_validator(mode="after")
@@ -130,9 +170,6 @@ class StudyPlan(_Part):
         length = len(self.conditions) * (len(self.modes) * len(self.tasks) + len(self.practice))
         if length > LONGEST_ORDER:
             raise ValueError(f"each operator would do {length} tasks; {LONGEST_ORDER} is the most")
-        texts = [question.text for question in self.questions]
-        if len(set(texts)) < len(texts):
-            raise ValueError("a question is asked twice; ask each once")
         return self
 
 
@@ -179,6 +216,11 @@ def order_of(plan: StudyPlan, row: int, seed: int) -> list[Slot]:
 def rows_of_balance(plan: StudyPlan) -> int:
     """How many operators a group needs at least for each block to be equally often in each place."""
     return len(balanced_square(len(plan.modes) * len(plan.conditions)))
+
+
+def expected_minutes(plan: StudyPlan) -> float:
+    """How long one operator takes for all tasks, practice included and breaks not, by `MINUTES_A_TASK`."""
+    return sum(MINUTES_A_TASK[slot.mode] for slot in order_of(plan, row=0, seed=0))
 
 
 def balanced_square(size: int) -> list[list[int]]:

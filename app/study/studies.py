@@ -118,30 +118,24 @@ class Studies:
             participant.consented_at = participant.consented_at or utc_now()
 
     def answer(self, participant_id: int, answers: dict[str, str]) -> None:
-        """What the participant answers, by the questions' texts.
+        """What the participant answers, by the questions' texts; None is kept of what they left empty.
 
         Raises:
-            StudyError: before they have agreed to take part, and where a question is not answered, not
-                asked, or has no such choice.
+            StudyError: before they have agreed to take part, and where a question that has to be answered
+                is not, is not asked, or has no such choice.
         """
         with self._database.write() as session:
             participant = _participant(session, participant_id)
             plan = StudyPlan.model_validate(participant.study.plan)
             if plan.consent and participant.consented_at is None:
                 raise StudyError("please agree to take part first; nothing is kept of you before")
-            questions = {q.text: q for q in plan.questions}
-            for text in questions.keys() | answers.keys():
-                if text not in questions:
-                    raise StudyError(f"the study does not ask {text!r}")
-                given = answers.get(text, "").strip()
-                if not given:
-                    raise StudyError(f"please answer {text!r}")
-                choices = questions[text].choices
-                if choices and given not in choices:
-                    raise StudyError(
-                        f"{given!r} is no answer to {text!r}; choose one of {', '.join(choices)}"
-                    )
-            participant.answers = {text: answers[text].strip() for text in questions}
+            questions = {question.text: question for question in plan.questions}
+            strange = next((text for text in answers if text not in questions), None)
+            if strange is not None:
+                raise StudyError(f"the study does not ask {strange!r}")
+            participant.answers = {
+                text: question.checked(answers.get(text, "")) for text, question in questions.items()
+            }
 
     def finish(self, participant_id: int) -> None:
         """Note when a participant is through; nothing happens where they are not."""

@@ -169,7 +169,7 @@ def _annotated(set_name: str) -> Iterator[Instance]:
     models = {known.obj_id: _model(set_name, known) for known in dataset.objects}
     names = {known.obj_id: _name(set_name, known) for known in dataset.objects}
     for image in images[:: FRAME_STEPS.get(set_name, 1)]:
-        depth = read_depth(image.depth_path, image.depth_scale)
+        depth = read_depth(image.depth.path, image.depth_scale)
         truths = image.ground_truth or ()
         for index, truth in enumerate(truths):
             model, name = models[truth.obj_id], names[truth.obj_id]
@@ -182,7 +182,7 @@ def _annotated(set_name: str) -> Iterator[Instance]:
             scene = name if set_name == YCB else str(image.image_id)
             yield Instance(
                 set_name, f"{set_name} {scene}", name, model, depth, image.camera, truth.T_camera_object,
-                image.image_id * len(truths) + index, color_path=image.color_path,
+                image.image_id * len(truths) + index, color_path=image.color.path if image.color else None,
                 T_world_camera=image.T_world_camera, alike=alike,
             )  # fmt: skip
 

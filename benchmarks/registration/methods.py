@@ -97,7 +97,7 @@ class Opinion:
 def opinion(instance: Instance, T_start: Array, T: Array) -> Opinion:
     """What a snap from one pose (4, 4) would say of another."""
     centred = T @ pose.from_rotation_translation(np.eye(3), instance.model.centre)
-    score, counts = judged(_run(instance, T_start), to_rows(centred[None])[0])
+    score, counts, _ = judged(_run(instance, T_start), to_rows(centred[None])[0])
     return Opinion(score, float(match_shares(counts[None])[0]), float(shown_shares(counts[None])[0]))
 
 

@@ -175,7 +175,7 @@ def real_shots(name: str, every: int) -> Iterator[Shot]:
         for obj_id in {truth.obj_id for truth in truths} - set(models):
             models[obj_id] = read_model(DATA / name, obj_id)
         objects = [(models[truth.obj_id], truth.T_camera_object) for truth in truths]
-        yield Shot(image.camera, objects, read_depth(image.depth_path, image.depth_scale))
+        yield Shot(image.camera, objects, read_depth(image.depth.path, image.depth_scale))
 
 
 def synthetic_shots(scenes: int) -> Iterator[Shot]:

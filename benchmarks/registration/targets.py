@@ -56,6 +56,7 @@ def figures(results: Sequence[InstanceTrials]) -> list[Figure]:
     return [
         *_successes(default, RIGHT, "ADD(-S) < 10 %", "is_right"),
         *_ambiguities(default),
+        *_truths(results),
         *_successes(default, EXACT, "MSSD < 5 %", "is_exact"),
         *_noise_limit(results),
         *_rotations(default),
@@ -85,6 +86,15 @@ def _ambiguities(trials: Sequence[Trial]) -> Iterable[Figure]:
         if elsewhere:
             name = f"{set_name}, wrong though depth fits as well as at the truth, of all"
             yield Figure(name, _percent(elsewhere), "%")
+
+
+def _truths(results: Sequence[InstanceTrials]) -> Iterable[Figure]:
+    """How often the polish that starts at the truth ends elsewhere: hardly anything does better by depth."""
+    for set_name in REAL:
+        own = [one for one in results if one.trials and one.trials[0].set_name == set_name]
+        if own:
+            name = f"{set_name}, the truth, polished on the depth, has an MSSD >= 5 %, of all"
+            yield Figure(name, _percent([not one.polish_error.is_exact for one in own]), "%")
 
 
 def _noise_limit(results: Sequence[InstanceTrials]) -> Iterable[Figure]:

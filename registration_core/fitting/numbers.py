@@ -122,7 +122,7 @@ def decision_features(table: FeatureTable, rounds: int, temperature: int) -> Arr
     """FEATURES (T, F) of the winners after so many rounds."""
     beliefs = table.beliefs[:, rounds, temperature].astype(np.float64)
     values, counts = table.scores[:, rounds].astype(np.float64), from_units(table.counts[:, rounds])
-    return features(beliefs, values, counts)
+    return features(beliefs, values, counts, table.spreads[:, rounds].astype(np.float64))
 
 
 def claimed(table: FeatureTable, confidence: dict[str, Any]) -> Array:

@@ -31,6 +31,8 @@ class Decision:
     score: float
     counts: Array
     """(COUNT,)."""
+    spread: float
+    """Of its surface."""
     right: bool
     exact: bool
 
@@ -68,6 +70,7 @@ def _decision(
         beliefs=tuple(beliefs),
         score=float(scores[best]),
         counts=trial.counts[best],
+        spread=float(trial.spreads[best]),
         right=bool(trial.right[best]),
         exact=bool(trial.exact[best]),
     )

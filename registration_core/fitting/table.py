@@ -51,6 +51,8 @@ class FeatureTable:
     """(T, R), the winner's."""
     counts: NDArray[np.int16]
     """(T, R, COUNT), the winner's, in UNITs."""
+    spreads: NDArray[np.float32]
+    """(T, R), of the winner's surface."""
     won_right: NDArray[np.bool_]
     """(T, R), whether its mean distance is small enough."""
     won_exact: NDArray[np.bool_]
@@ -102,6 +104,7 @@ def table_of(trials: Sequence[Trial]) -> FeatureTable:
         beliefs=nothing.astype(np.float32),
         scores=nothing.astype(np.float32),
         counts=nothing.astype(np.int16),
+        spreads=nothing.astype(np.float32),
         won_right=nothing.astype(np.bool_),
         won_exact=nothing.astype(np.bool_),
     )
@@ -115,6 +118,7 @@ def with_decisions(table: FeatureTable, decisions: Sequence[Decision]) -> Featur
         beliefs=np.array([one.beliefs for one in decisions], np.float32).reshape(*shape, len(TEMPERATURES)),
         scores=np.array([one.score for one in decisions], np.float32).reshape(shape),
         counts=in_units(np.array([one.counts for one in decisions])).reshape(*shape, evidence.COUNT),
+        spreads=np.array([one.spread for one in decisions], np.float32).reshape(shape),
         won_right=np.array([one.right for one in decisions]).reshape(shape),
         won_exact=np.array([one.exact for one in decisions]).reshape(shape),
     )

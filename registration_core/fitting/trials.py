@@ -81,6 +81,8 @@ class Trial:
     """(N,), whether the mean distance is below RIGHT."""
     exact: NDArray[np.bool_]
     """(N,), whether the largest distance is below EXACT."""
+    spreads: Array
+    """(N,), of the surface, as `surface_spreads` gives them."""
 
 
 def all_trials(seed: int, scenes: int) -> list[Trial]:
@@ -181,6 +183,7 @@ def _trial(
         tails=heavy_tails(poses, run.problem.prior),
         right=mean < RIGHT * model.diameter,
         exact=largest < EXACT * model.diameter,
+        spreads=run.spreads(poses),
     )
 
 

@@ -3,16 +3,17 @@
 import { getAll } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
 import { count, percent } from "../format.js";
+import { openWarnings as warningsOf } from "./warnings.js";
 
 const ASK_AGAIN_MS = 1000;
 
 let timer = null;
 
 /**
- * Shows all datasets and returns them. `choose(id or null)` is called when one is pressed; `openImport` and
- * `openRisk(dataset)` are null for those who may not.
+ * Shows all datasets and returns them. `choose(id or null)` is called when one is pressed; `openImport`,
+ * `openRisk(dataset)` and `openWarnings(dataset)` are null for those who may not.
  */
-export async function showDatasets({ selected, choose, openImport, openRisk }) {
+export async function showDatasets({ selected, choose, openImport, openRisk, openWarnings }) {
   const datasets = await getAll("/api/datasets");
   const buttons = datasets.map((dataset) => datasetButton(dataset));
 
@@ -29,6 +30,7 @@ export async function showDatasets({ selected, choose, openImport, openRisk }) {
   press(selected);
   const cards = datasets.map((dataset, index) => {
     const links = [objectsLink(dataset), ...(openRisk ? [riskButton(dataset, openRisk)] : [])];
+    if (openWarnings && warningsOf(dataset).length) links.push(warningsButton(dataset, openWarnings));
     return element("div", {}, buttons[index], element("p", { className: "dataset-links" }, ...links));
   });
   byId("datasets").replaceChildren(...(cards.length ? cards : [nothingImported(openImport)]));
@@ -92,6 +94,15 @@ function riskButton(dataset, openRisk) {
     button.append(icon("alert"));
     button.title = "No confidence bears it out";
   }
+  return button;
+}
+
+/** "2 odd things", with a sign: leads to what they are. */
+function warningsButton(dataset, openWarnings) {
+  const props = { type: "button", className: "link", onclick: () => openWarnings(dataset) };
+  const button = element("button", props, count(warningsOf(dataset).length, "odd thing"), icon("alert"));
+  button.setAttribute("aria-haspopup", "dialog");
+  button.setAttribute("aria-label", `What looked odd in ${dataset.name}`);
   return button;
 }
 

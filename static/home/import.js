@@ -13,7 +13,10 @@ export function setUpImport(onImported) {
   let upload = null;
 
   input.addEventListener("change", showChosen);
-  byId("import-form").addEventListener("submit", start);
+  byId("import-form").addEventListener("submit", (event) => {
+    event.preventDefault();
+    start({});
+  });
   dialog.addEventListener("close", () => upload?.abort());
   setUpDrop(byId("drop"), (files) => {
     input.files = files;
@@ -28,16 +31,22 @@ export function setUpImport(onImported) {
     message.clear();
   }
 
-  function start(event) {
-    event.preventDefault();
+  /** `fields` go with the file, in the place of what the dataset says. */
+  function start(fields) {
     message.clear();
     setBusy(true);
-    upload = sendZip(input.files[0], showProgress, (outcome) => {
+    upload = sendZip(input.files[0], fields, showProgress, (outcome) => {
       upload = null;
       setBusy(false);
       if (outcome.dataset) finish(outcome.dataset);
-      else if (outcome.problem) message.show(outcome.problem, "problem");
+      else if (outcome.problem) message.show(outcome.problem, "problem", suggestion(outcome));
     });
+  }
+
+  /** The one click that imports with what the server suggests. */
+  function suggestion({ suggested }) {
+    if (!suggested?.depth_scale) return null;
+    return { label: `Import with depth scale ${suggested.depth_scale}`, run: () => start(suggested) };
   }
 
   function finish(dataset) {
@@ -69,9 +78,10 @@ function showProgress(sent) {
 }
 
 /** Uploads with XMLHttpRequest, as fetch tells nothing of an upload's progress. */
-function sendZip(file, onProgress, onEnd) {
+function sendZip(file, fields, onProgress, onEnd) {
   const body = new FormData();
   body.append("file", file);
+  for (const [name, value] of Object.entries(fields)) body.append(name, value);
   const call = new XMLHttpRequest();
   call.upload.addEventListener("progress", (event) => onProgress(event.loaded / event.total));
   call.addEventListener("load", () => onEnd(uploadOutcome(call)));
@@ -89,7 +99,15 @@ function uploadOutcome({ status, responseText }) {
     return {};
   }
   if (status >= 200 && status < 300) return { dataset: JSON.parse(responseText) };
-  return { problem: problemSentence(status, responseText) };
+  return { problem: problemSentence(status, responseText), suggested: suggestedFields(responseText) };
+}
+
+function suggestedFields(responseText) {
+  try {
+    return JSON.parse(responseText).suggested;
+  } catch {
+    return null; // the sentence above says what answered instead
+  }
 }
 
 function setUpDrop(area, onFiles) {

@@ -1,24 +1,29 @@
-/** The tasks as cards, filtered by dataset, scene and state. The filter is kept in the page's address. */
+/** The tasks as cards, filtered by dataset, scene, state, mode and condition. The filter is kept in the page's address. */
 
 import { get, getAll } from "../api.js";
 import { verdictMark } from "../assessment.js";
 import { byId, element, icon, picture, setText } from "../dom.js";
-import { count, METHODS, taskName } from "../format.js";
+import { count, METHODS } from "../format.js";
+import { addressWith, CHOICES, filterIn, isNarrow } from "../task-filter.js";
+import { keepPlace } from "./place.js";
 
 const PAGE = 48;
 const STATES = { open: "Open", in_progress: "In progress", submitted: "Submitted", skipped: "Skipped" };
 
+/** What tasks may differ in, which is shown where they do. */
+const KINDS = ["mode", "condition"];
+
 /** `openAddTasks` is null for those who may not add tasks; `onProblem(error)` shows what went wrong. */
 export function setUpTasks({ me, openAddTasks, onProblem }) {
-  const given = new URLSearchParams(location.search);
-  const names = ["dataset_id", "scene_id", "state"];
-  const filter = Object.fromEntries(names.map((name) => [name, given.get(name)]));
+  const filter = filterIn(location.search);
   let datasets = [];
   let next = null;
   let request = 0;
+  keepPlace(() => ({ shown: byId("tasks").childElementCount }));
 
   byId("scene-filter").addEventListener("change", (event) => change("scene_id", event.target.value));
   byId("state-filter").addEventListener("change", (event) => change("state", event.target.value));
+  for (const kind of KINDS) byId(`${kind}-filter`).addEventListener("change", (event) => change(kind, event.target.value));
   byId("more").addEventListener("click", () => showMore().catch(onProblem));
   for (const radio of document.querySelectorAll("#state-filter input")) {
     radio.checked = radio.value === (filter.state ?? "");
@@ -32,12 +37,12 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
   async function chooseDataset(id) {
     if (String(id) !== String(filter.dataset_id)) filter.scene_id = null;
     filter.dataset_id = id;
+    showKinds();
     await Promise.all([show(), showScenes()]);
   }
 
   async function show() {
-    const address = new URLSearchParams(Object.entries(filter).filter(([, value]) => value !== null));
-    history.replaceState(null, "", address.size ? `?${address}` : location.pathname);
+    history.replaceState(null, "", addressWith(location.pathname, filter));
     const mine = ++request;
     const page = await get("/api/tasks", { ...filter, limit: PAGE });
     if (mine !== request) return; // A newer choice was made meanwhile.
@@ -55,7 +60,12 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   function append({ items, next: cursor }) {
     next = cursor ?? null;
-    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me), cardLinks(task, me))));
+    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me, filter), cardLinks(task, me))));
+    for (const kind of KINDS) {
+      const nodes = [...document.querySelectorAll(`#tasks [data-kind="${kind}"]`)];
+      const isSame = new Set(nodes.map((node) => node.textContent)).size < 2;
+      for (const node of nodes) node.hidden = isSame;
+    }
     byId("more").hidden = next === null;
     setText(byId("tasks-status"), `${count(byId("tasks").childElementCount, "task")} shown`);
   }
@@ -71,13 +81,27 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
     select.title = datasetId === null ? "Choose a dataset first" : "";
   }
 
+  /** A choice of modes or conditions is there where there are several. */
+  function showKinds() {
+    const chosen = datasets.filter(({ id }) => filter.dataset_id === null || String(id) === String(filter.dataset_id));
+    for (const kind of KINDS) {
+      const select = byId(`${kind}-filter`);
+      const there = new Set(chosen.flatMap((dataset) => dataset[`${kind}s`]));
+      if (filter[kind]) there.add(filter[kind]);
+      select.replaceChildren(new Option(`All ${kind}s`, ""), ...[...there].sort().map((name) => new Option(name, name)));
+      select.value = filter[kind] ?? "";
+      select.parentElement.hidden = there.size < 2 && !filter[kind];
+    }
+  }
+
   function describeNone() {
     const title = element("h2", {}, "No tasks here");
-    if (filter.state || filter.scene_id) {
+    if (isNarrow(filter)) {
       const clear = element("button", { type: "button", className: "button" }, "Show all tasks");
       clear.addEventListener("click", () => {
-        filter.scene_id = filter.state = null;
+        for (const name of CHOICES) filter[name] = null;
         byId("scene-filter").value = "";
+        showKinds();
         document.querySelector("#state-filter input").checked = true;
         show().catch(onProblem);
       });
@@ -92,16 +116,22 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
     ];
   }
 
+  /** Shows as many tasks as were shown when the page was left, from where they were seen. */
+  async function goBackTo({ shown, top }) {
+    while (next !== null && byId("tasks").childElementCount < shown) await showMore();
+    scrollTo(0, top);
+  }
+
   const setDatasets = (all) => {
     datasets = all;
   };
-  return { filter, chooseDataset, setDatasets };
+  return { filter, chooseDataset, setDatasets, goBackTo };
 }
 
-function taskCard(task, me) {
+function taskCard(task, me, filter) {
   const card = element("a", {
     className: "card",
-    href: `/label/${task.id}`,
+    href: addressWith(`/label/${task.id}`, filter),
     "data-task-id": task.id,
     "data-state": task.state,
   });
@@ -110,8 +140,9 @@ function taskCard(task, me) {
     element(
       "span",
       { className: "card-text" },
-      element("span", { className: "card-name" }, taskName(task)),
+      element("span", { className: "card-name" }, task.name),
       element("span", { className: "card-scene" }, sceneText(task)),
+      element("span", { className: "card-kinds" }, ...KINDS.map((kind) => element("span", { "data-kind": kind }, task[kind]))),
       element("span", { className: "card-state" }, icon(task.state), stateSentence(task, me)),
     ),
   );
@@ -140,11 +171,12 @@ function cardLinks({ operators, object }, me) {
   return element("p", { className: "card-links" }, icon("cube"), page, ...replays);
 }
 
-/** "In progress · you, Ada", "Skipped · you (no depth)". */
+/** "In progress · you, Ada (open now)", "Skipped · you (no depth)". */
 function stateSentence(task, me) {
-  const names = task.operators.map(({ name, skip_reason: reason }) => {
+  const names = task.operators.map(({ name, skip_reason: reason, is_here: isHere }) => {
     const who = name === me.name ? "you" : name;
-    return reason ? `${who} (${reason})` : who;
+    const more = [reason, isHere ? "open now" : null].filter(Boolean);
+    return more.length ? `${who} (${more.join(", ")})` : who;
   });
   return names.length ? `${STATES[task.state]} · ${names.join(", ")}` : STATES[task.state];
 }

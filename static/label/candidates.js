@@ -21,7 +21,7 @@ export function candidatesPart(page) {
   byId("candidate-previous").addEventListener("click", () => step(-1));
   byId("candidate-next").addEventListener("click", () => step(+1));
   byId("candidate-take").addEventListener("click", accept);
-  byId("candidates-leave").addEventListener("click", close);
+  byId("candidates-leave").addEventListener("click", leave);
 
   function open(_task, scene, object) {
     frames = scene.frames;
@@ -88,7 +88,8 @@ export function candidatesPart(page) {
   }
 
   function step(by) {
-    if (byId("candidates").hidden || !cards.length || !page.canMove()) return;
+    if (cards.length < 2 || !page.canMove()) return;
+    byId("candidates").hidden = false;
     const from = chosen < 0 ? 0 : chosen; // of modes the first is where the object is
     choose((from + by + cards.length) % cards.length);
   }
@@ -113,17 +114,13 @@ export function candidatesPart(page) {
     return true;
   }
 
-  /** True if there was something to leave: candidates that were asked for, or a mode that is looked at. */
+  /** True if there was something to leave; modes come back with a step to one of them. */
   function leave() {
-    if (byId("candidates").hidden || (source.kind === "mode" && chosen < 0)) return false;
-    if (source.kind === "proposal") del(source.url).catch(page.message.problem);
-    else choose(-1);
-    return true;
-  }
-
-  function close() {
-    leave();
+    if (byId("candidates").hidden) return false;
     byId("candidates").hidden = true;
+    if (chosen >= 0) choose(-1); // also after a choice that is still on its way
+    if (source.kind === "proposal") del(source.url).catch(page.message.problem);
+    return true;
   }
 
   const bindings = [

@@ -2,6 +2,7 @@
 
 import { get } from "../api.js";
 import { byId, element, picture } from "../dom.js";
+import { POSED_BY } from "../posed-by.js";
 
 /** A part of the labelling page. */
 export function copyPart(page) {
@@ -55,13 +56,12 @@ export function copyPart(page) {
   return { title: "The object", bindings, draw };
 }
 
-function nameOf({ is_neighbour: isNeighbour, scene, instance, operator }) {
-  if (!isNeighbour) return operator;
-  return instance > 0 ? `${scene}, no. ${instance + 1}` : scene;
+function nameOf({ is_neighbour: isNeighbour, scene, name, operator }) {
+  return isNeighbour ? `${scene}, ${name}` : operator;
 }
 
-function infoOf({ is_neighbour: isNeighbour, is_mine: isMine, operator, state, confidence }) {
+function infoOf({ is_neighbour: isNeighbour, is_mine: isMine, operator, state, confidence, posed_by: poser }) {
   const whose = isMine ? "mine" : isNeighbour ? `by ${operator}` : "this task";
-  const how = confidence === null ? "posed by hand" : `confidence ${confidence.toFixed(2)}`;
+  const how = confidence === null ? POSED_BY[poser] : `confidence ${confidence.toFixed(2)}`;
   return [whose, state === "submitted" ? "submitted" : "not submitted yet", how].join(" · ");
 }

@@ -7,6 +7,7 @@ import { possible } from "./panel.js";
 /** A part of the labelling page. */
 export function endingPart(page) {
   const dialog = byId("skip-dialog");
+  let task = null;
   const reasons = [...dialog.querySelectorAll("[data-reason]")];
 
   byId("skip").addEventListener("click", ask);
@@ -37,9 +38,9 @@ export function endingPart(page) {
     dialog.close();
     page.message.clear();
     byId("replay").href = `/replay/${page.registration().id}`;
-    showNext().catch(page.message.problem);
+    showNext(task).catch(page.message.problem);
   }
 
   const bindings = [{ keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask, tool: "ending" }];
-  return { title: "The task", bindings, draw };
+  return { title: "The task", bindings, open: (opened) => (task = opened), draw };
 }

@@ -1,7 +1,8 @@
 /** The frames of the scene as a strip of thumbnails, with the object's outline in each. */
 
 import { byId, element, picture, setText } from "../dom.js";
-import { resize, shownCamera } from "./outline.js";
+import { shownCamera } from "./outline.js";
+import { resize } from "./webgl.js";
 import { relativeTo } from "./pose.js";
 
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image

@@ -5,17 +5,24 @@ import { MOD } from "./keys.js";
 
 const TURNED = 30; // page pixels of a drag beside the object that turn the view visibly
 
+const CAMERA_KEYS = /^(Key[WASDQE]|Arrow\w+)$/; // viser's own
+
 /**
- * In order. `text` has keys in backticks; `isDone(now, before)` compares two states of the registration. What
- * the server does not know of, the view and the image, is told by `done(name)` below.
+ * In order; each can be done by mouse and by keys. `text` has keys in backticks, and `byKeys` follows it where
+ * there are those keys; `isDone(now, before)` compares two states of the registration. What the server does not
+ * know of, the view and the image, is told by `check(name)` below.
  */
 const STEPS = [
   {
-    name: "drag",
+    name: "move",
     text: "Drag one of the object's arrows: it moves that way. Squares move it in a plane, arcs turn it.",
-    isDone: (now, before) => before.dragging && !now.dragging && now.can_undo,
+    byKeys: { tool: "precision", text: " Or press `J` `L` `I` `K` `U` `O`; with `Shift` they turn it." },
+    isDone: (now, before) => now.can_undo && !now.dragging && (before.dragging || isElsewhere(now, before)),
   },
-  { name: "turn", text: "Turn the view: drag beside the object. The wheel comes closer." },
+  {
+    name: "turn",
+    text: "Turn the view: drag beside the object, or press `9` or `0`. The wheel comes closer, and so does `4`.",
+  },
   {
     name: "snap",
     text: "Bring the object roughly to its points, then press `Space`: the machine snaps it into place.",
@@ -54,9 +61,7 @@ export function guidePart(page) {
     start();
   });
   byId("image").addEventListener("zoomed", () => check("image"));
-  for (const button of document.querySelectorAll("[data-look]")) {
-    button.addEventListener("click", () => check("turn"));
-  }
+  byId("view").addEventListener("looked", () => check("turn"));
 
   /** Somebody who has submitted nothing yet is shown around, but once. */
   function open() {
@@ -67,6 +72,7 @@ export function guidePart(page) {
     if (remembered ? remembered.isOn : page.me().submitted === 0) start();
   }
 
+  const textOf = ({ text, byKeys }) => text + (byKeys && page.has(byKeys.tool) ? byKeys.text : "");
   const key = () => `snap6d.guide.${page.me().id}`;
   const remember = () => localStorage.setItem(key(), JSON.stringify({ isOn, done: [...done] }));
 
@@ -93,7 +99,7 @@ export function guidePart(page) {
   function show() {
     const next = steps.find(({ name }) => !done.has(name));
     byId("guide").hidden = !isOn;
-    byId("guide-text").replaceChildren(...withKeys(next?.text ?? END));
+    byId("guide-text").replaceChildren(...withKeys(next ? textOf(next) : END));
     byId("guide-steps").replaceChildren(...steps.map((step) => mark(done.has(step.name), step === next)));
     setText(byId("guide-place"), next ? `${steps.indexOf(next) + 1} of ${steps.length}` : "Done");
     setText(byId("guide-skip"), next ? "Skip" : "Close");
@@ -106,6 +112,7 @@ export function guidePart(page) {
     const capture = { capture: true };
     view.addEventListener("pointerdown", (event) => (pressed = event), capture);
     view.addEventListener("wheel", () => check("turn"), capture);
+    view.addEventListener("keydown", ({ code }) => CAMERA_KEYS.test(code) && check("turn"), capture);
     view.addEventListener(
       "pointerup",
       ({ clientX, clientY }) => {
@@ -119,6 +126,8 @@ export function guidePart(page) {
 
   return { open, draw, attach };
 }
+
+const isElsewhere = (now, before) => String(now.T_world_object) !== String(before.T_world_object);
 
 function withKeys(text) {
   return text.split("`").map((part, index) => (index % 2 ? element("kbd", {}, part) : part));

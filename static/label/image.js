@@ -3,8 +3,9 @@
 import { byId, rgb, setText } from "../dom.js";
 import { depthOf } from "./depth.js";
 import { frameStrip } from "./frames.js";
-import { extentInPicture, meshDrawing, resize, sharedDrawing, shownCamera } from "./outline.js";
+import { extentInPicture, meshDrawing, sharedDrawing, shownCamera } from "./outline.js";
 import { relativeTo } from "./pose.js";
+import { resize } from "./webgl.js";
 import { zoomable } from "./zoom.js";
 
 const CLOSE = 2.5; // page pixels to one of the picture from which on these are shown as squares
@@ -60,7 +61,7 @@ export function imagePart(page) {
     if (!frame) return;
     registration = newest.preview ? asLookedAt(newest, frame) : newest;
     if (shown !== frame) showFrame(frame);
-    canvas.dataset.source = newest.preview || newest.confidence !== null ? "machine" : "human";
+    canvas.dataset.source = newest.preview || newest.posed_by === "machine" ? "machine" : "human";
     showAgreement(newest.layers?.agreement);
     drawPose();
   }

@@ -10,7 +10,6 @@
 
 import { del, get, post, put } from "../api.js";
 import { byId, setText } from "../dom.js";
-import { taskName } from "../format.js";
 import { messageArea } from "../message.js";
 import { candidatesPart } from "./candidates.js";
 import { connectionPart } from "./connection.js";
@@ -25,6 +24,7 @@ import { machinePart } from "./machine.js";
 import { methodPart } from "./method.js";
 import { goToNext } from "./next.js";
 import { numbersPart } from "./numbers.js";
+import { othersPart } from "./others.js";
 import { drawPanel, possible } from "./panel.js";
 import { placePart } from "./place.js";
 import { precisionPart } from "./precision.js";
@@ -32,15 +32,19 @@ import { seeingPart } from "./seeing.js";
 import { signInAgainHere } from "./sign-in-again.js";
 import { snapFramesPart } from "./snap-frames.js";
 import { followRegistration } from "./stream.js";
+import { submissionPart } from "./submission.js";
 import { thingsPart } from "./things.js";
 import { threePointsPart } from "./three-points.js";
+import { swapPart } from "./swap.js";
 import { showTools } from "./tools.js";
 import { trialPart } from "./trial.js";
 import { uncertaintyPart } from "./uncertainty.js";
 import { closeView, focusView, openView } from "./view.js";
+import { viewRingPart } from "./view-ring.js";
 import { viewsPart } from "./views.js";
 import { isSnapping, waitingPart } from "./waiting.js";
 
+const BEHIND_NOTICE = ".stage > :not(#closed), #strip, .side, #help";
 const taskId = location.pathname.split("/").filter(Boolean).at(-1);
 const message = messageArea(byId("message"));
 const pending = new Set();
@@ -68,11 +72,15 @@ const page = {
   showFrame: (frame) => page.put("frame", { frame_id: frame.id }),
   leaveMode,
 };
+const submission = submissionPart(page);
 const PARTS = [
+  submission,
   endingPart(page),
   connectionPart(page),
+  othersPart(),
   guidePart(page),
   imagePart(page),
+  swapPart(),
   machinePart(page),
   methodPart(page),
   snapFramesPart(page),
@@ -87,6 +95,7 @@ const PARTS = [
   uncertaintyPart(page),
   seeingPart(page),
   viewsPart(page),
+  viewRingPart(),
   trialPart(page),
   waitingPart(),
 ];
@@ -97,7 +106,7 @@ const ACTIONS = {
   undo: () => page.post("undo"),
   redo: () => page.post("redo"),
   reset: () => page.post("reset"),
-  submit: () => page.post("submit"),
+  submit: submission.submit,
   reopen: () => page.post("reopen"),
   "offer-accept": () => page.post("accept"),
   "offer-dismiss": () => page.post("dismiss"),
@@ -109,7 +118,7 @@ const BINDINGS = [
     { keys: ["Mod+Z"], does: "Undo", run: (_key, isHeld) => step("undo", isHeld), repeats: true },
     { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: (_key, isHeld) => step("redo", isHeld), repeats: true },
     { keys: ["Shift+R"], does: "Back to the start pose", run: () => act("reset") },
-    { keys: ["Escape"], does: "Leave a mode, or cancel the snap", run: leaveOrCancel },
+    { keys: ["Escape"], does: "Leave a mode, or cancel the snap; or back to the 3-D view", run: leaveOrCancel },
     { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
     { keys: ["?"], does: "Show these keys", run: () => openHelp() },
   ]),
@@ -163,12 +172,12 @@ async function openTask() {
 }
 
 function showTask() {
-  const { dataset, scene } = task;
-  const name = taskName(task);
+  const { dataset, scene, name } = task;
   document.title = `${name} · ${scene.label} · Snap6D`;
   setText(byId("crumb-dataset"), dataset.name);
   setText(byId("crumb-scene"), scene.label);
   setText(byId("crumb-object"), name);
+  setText(byId("title"), name);
   byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
   byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
   if (!page.isTrial()) byId("crumb-object").href = `/objects/${task.object.id}`;
@@ -265,8 +274,11 @@ function leaveMode() {
   return PARTS.some((part) => part.leave?.());
 }
 
+/** With nothing to leave or to cancel the keys go back to the view, where some of them steer its camera. */
 function leaveOrCancel() {
-  if (!leaveMode()) act("cancel");
+  if (leaveMode()) return;
+  if (possible(registration, connected).cancel) act("cancel");
+  else focusView();
 }
 
 function accept() {
@@ -308,6 +320,8 @@ function showClosed(title, text, retry) {
   setText(byId("closed-text"), text);
   setText(byId("closed-retry"), retry);
   byId("closed").hidden = false;
+  for (const node of document.querySelectorAll(BEHIND_NOTICE)) node.inert = true;
+  byId("closed-retry").focus();
 }
 
 function path(action) {

@@ -1,8 +1,8 @@
-/** What comes after a task: the next one. */
+/** What comes after a task: the next one of those that its operator works on. */
 
 import { nextTask } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
-import { taskName } from "../format.js";
+import { addressWith, filterIn, isNarrow } from "../task-filter.js";
 
 let shown = Promise.resolve();
 
@@ -12,17 +12,21 @@ export async function goToNext() {
   location.assign(byId("next-task").href);
 }
 
-/** Shows where `#next-task` leads; without another task it leads home. */
-export function showNext() {
-  shown = show();
+/**
+ * Shows where `#next-task` leads: to another task of the dataset, and of what was chosen on the home page; without
+ * one it leads home.
+ */
+export function showNext({ dataset }) {
+  shown = show(dataset);
   return shown;
 }
 
-async function show() {
-  const task = await nextTask();
+async function show(dataset) {
+  const filter = filterIn(location.search);
+  const task = await nextTask({ ...filter, dataset_id: filter.dataset_id ?? dataset.id });
   const link = byId("next-task");
-  link.href = task ? `/label/${task.id}` : "/";
+  link.href = addressWith(task ? `/label/${task.id}` : "/", filter);
   link.replaceChildren(task ? "Next task " : "Back to the tasks ", element("kbd", {}, "Enter"), icon("next"));
-  const sentence = task ? `Next: ${taskName(task)}, ${task.scene.label}.` : "That was the last one.";
+  const sentence = task ? `Next: ${task.name}, ${task.scene.label}.` : `That was the last one of ${isNarrow(filter) ? "those you chose" : dataset.name}.`;
   setText(byId("next-name"), sentence);
 }

@@ -14,10 +14,10 @@ const ZOOM = 1.5; // for a hundred units of the wheel
 const HIDDEN = 0.01; // in radii: a point so much behind the surface is not seen
 
 /**
- * Shows the page's object (`sharedDrawing`) in `canvas`; `onPoint(point)` gets what is clicked, metres, in the
+ * Shows the page's object (`objectDrawing`) in `canvas`; `onPoint(point)` gets what is clicked, metres, in the
  * object's frame, and `onTurn` is told when the view has changed. Returns null where the browser has no WebGL 2.
  */
-export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
+export function objectView(canvas, { mesh, drawOn, drawUnder }, { onPoint, onTurn }) {
   if (!drawOn) return null;
   const { middle, radius } = sphereAround(mesh.vertices);
   let rotation = null; // of the object in the view's axes, 3x3
@@ -87,7 +87,9 @@ export function objectView(canvas, { mesh, drawOn }, { onPoint, onTurn }) {
     canvas.height = Math.round(canvas.clientHeight * unit);
     const color = rgb(getComputedStyle(canvas).color);
     const T = motion ? product(poseInView(), motion) : poseInView();
-    drawOn(canvas, { camera: cameraFor(unit), T, color, blend: 1, unit });
+    const camera = cameraFor(unit);
+    drawOn(canvas, { camera, T, color, blend: drawUnder ? 0 : 1, unit });
+    drawUnder?.(canvas, { camera, T });
     onTurn();
   }
 

@@ -1,9 +1,8 @@
 /** Draws a mesh as a camera sees it, as an outline or as a shaded shape, by WebGL. */
 
 import { OUTLINE_FRAGMENT, SHAPE_FRAGMENT, SHAPE_VERTEX, WHOLE_VERTEX } from "./shaders.js";
+import { columns, link, NEAR, projection, resize } from "./webgl.js";
 
-const NEAR = 0.01; // metres
-const FAR = 100;
 const SAMPLES = 4;
 const DEPTH_UNIT = 1; // of the textures; 0 is the shape
 const BLOCK = 16; // pixels: sizes are multiples, so that the levels of a mipmap average whole blocks
@@ -143,12 +142,6 @@ export function meshCopying(mesh) {
   };
 }
 
-/** Gives a canvas a size in pixels; only where it changes, since that wipes it. */
-export function resize(canvas, width, height) {
-  if (canvas.width !== width) canvas.width = width;
-  if (canvas.height !== height) canvas.height = height;
-}
-
 /** Puts a depth image where shaders read it. */
 function fillDepth(gl, { raw, width, height }) {
   gl.activeTexture(gl.TEXTURE0 + DEPTH_UNIT);
@@ -166,22 +159,6 @@ function makeDepth(gl) {
   fillDepth(gl, { raw: new Uint16Array(1), width: 1, height: 1 });
 }
 
-/** From camera axes (x right, y down, z forward) to WebGL's clip space, row by row. */
-function projection({ fx, fy, cx, cy }, width, height) {
-  const depth = FAR - NEAR;
-  return [
-    [(2 * fx) / width, 0, (2 * cx + 1) / width - 1, 0],
-    [0, (-2 * fy) / height, 1 - (2 * cy + 1) / height, 0],
-    [0, 0, (FAR + NEAR) / depth, (-2 * FAR * NEAR) / depth],
-    [0, 0, 1, 0],
-  ];
-}
-
-/** A 4x4 matrix as WebGL wants it. */
-function columns(matrix) {
-  return new Float32Array([0, 1, 2, 3].flatMap((column) => matrix.map((row) => row[column])));
-}
-
 function setUp(gl, vertices, faces) {
   const shape = link(gl, SHAPE_VERTEX, SHAPE_FRAGMENT);
   const outline = link(gl, WHOLE_VERTEX, OUTLINE_FRAGMENT);
@@ -194,26 +171,6 @@ function setUp(gl, vertices, faces) {
   gl.enableVertexAttribArray(position);
   gl.vertexAttribPointer(position, 3, gl.FLOAT, false, 0, 0);
   return { shape, outline };
-}
-
-function link(gl, vertex, fragment) {
-  const program = gl.createProgram();
-  for (const [kind, source] of [
-    [gl.VERTEX_SHADER, vertex],
-    [gl.FRAGMENT_SHADER, fragment],
-  ]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, source);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
-    throw new Error(`The outline cannot be drawn: ${gl.getProgramInfoLog(program)}`);
-  }
-  const places = new Map(); // asking WebGL each time would wait for it
-  const at = (name) => places.get(name) ?? places.set(name, gl.getUniformLocation(program, name)).get(name);
-  return { program, at };
 }
 
 /** A framebuffer with several samples a pixel, and one with a texture that they are averaged into. */

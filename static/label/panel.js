@@ -1,8 +1,9 @@
 /** Draws a registration into the panel; knows nothing of the server. */
 
 import { drawAssessment } from "../assessment.js";
-import { byId, icon, setText } from "../dom.js";
+import { byId, setText } from "../dom.js";
 import { framesText } from "../format.js";
+import { drawPoser } from "../posed-by.js";
 import { hintFor } from "./hint.js";
 import { isSnapping, snappingText, waitingText } from "./waiting.js";
 
@@ -56,7 +57,7 @@ function drawSaved({ dragging }, connected) {
   setText(byId("saved-text"), !connected ? "offline" : dragging ? "moving…" : "saved");
 }
 
-function drawConfidence({ confidence, assessment, can_undo: moved }) {
+function drawConfidence({ confidence, assessment, posed_by: poser }) {
   drawAssessment(byId("assessment"), assessment);
   const meter = byId("confidence");
   const known = confidence !== null;
@@ -65,13 +66,7 @@ function drawConfidence({ confidence, assessment, can_undo: moved }) {
   meter.setAttribute("aria-valuetext", known ? text : "no estimate of the machine");
   byId("confidence-fill").style.setProperty("--share", confidence ?? 0);
   setText(byId("confidence-number"), text);
-
-  const source = known ? "machine" : moved ? "human" : "start";
-  const badge = byId("source");
-  if (badge.dataset.source === source) return;
-  badge.dataset.source = source;
-  const words = { machine: "posed by the machine", human: "posed by hand", start: "start pose" };
-  badge.replaceChildren(icon(source === "start" ? "open" : source), words[source]);
+  drawPoser(byId("source"), poser);
 }
 
 function drawSnap(registration) {

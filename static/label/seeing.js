@@ -3,20 +3,21 @@
 import { byId, setText } from "../dom.js";
 import { drawsFinely, rememberLayers, rememberedLayers } from "./fineness.js";
 
-const AT_FIRST = { cloud: true, mesh: true, fine: true, agreement: false };
+const AT_FIRST = { cloud: true, mesh: true, texture: true, fine: true, agreement: false };
 
 /** A part of the labelling page. */
 export function seeingPart(page) {
   const buttons = [...document.querySelectorAll("[data-layer]")];
-  let isChanging = false;
+  let asked = null; // the layers that the server is on the way to be told
   const wanted = () => {
     const remembered = { ...AT_FIRST, fine: drawsFinely(), ...rememberedLayers() };
     return { ...remembered, agreement: remembered.agreement && page.has("agreement") };
   };
   for (const button of buttons) button.addEventListener("click", () => toggle(button.dataset.layer));
 
-  function draw({ agreement, layers }, before) {
+  function draw({ agreement, layers, has_texture: hasTexture }, before) {
     drawAgreement(agreement);
+    document.querySelector("[data-layer=texture]").hidden = !hasTexture;
     for (const button of buttons) button.setAttribute("aria-pressed", layers[button.dataset.layer]);
     byId("verdicts").hidden = !layers.agreement;
     const fresh = !before || (isSame(layers, AT_FIRST) && !isSame(before.layers, AT_FIRST)); // page or server came up
@@ -24,18 +25,29 @@ export function seeingPart(page) {
   }
 
   function toggle(name) {
-    if (!page.isConnected() || isChanging) return;
-    const { layers } = page.registration();
+    if (!page.isConnected()) return;
+    const layers = asked ?? page.registration().layers;
     const changed = { ...layers, [name]: !layers[name] };
     rememberLayers(changed);
     change(changed);
   }
 
+  /** The newest wish wins, and answers never overtake each other. */
   async function change(layers) {
-    if (isChanging) return;
-    isChanging = true;
-    await page.put("layers", layers).catch(page.message.problem);
-    isChanging = false;
+    const isSending = asked !== null;
+    asked = layers;
+    if (isSending) return;
+    try {
+      let sent;
+      do {
+        sent = asked;
+        await page.put("layers", sent);
+      } while (sent !== asked);
+    } catch (error) {
+      page.message.problem(error);
+    } finally {
+      asked = null;
+    }
   }
 
   const bindings = [
@@ -43,6 +55,7 @@ export function seeingPart(page) {
     { keys: ["B"], does: "Hide the cloud, and show it again", run: () => toggle("cloud") },
     { keys: ["Shift+F"], does: "All measured points, or few, which are drawn sooner", run: () => toggle("fine") },
     { keys: ["M"], does: "Hide the mesh, and show it again", run: () => toggle("mesh") },
+    { keys: ["Shift+M"], does: "The mesh in its own colours, or in orange", run: () => toggle("texture") },
   ];
   return { title: "The view", bindings, draw };
 }

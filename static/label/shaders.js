@@ -1,4 +1,4 @@
-/** What WebGL runs to draw a mesh as an outline, as a shaded shape, or in the colours of depth agreement. */
+/** What WebGL runs to draw a mesh: as an outline, a shaded shape, in colours of depth agreement, or in its own. */
 
 export const SHAPE_VERTEX = `#version 300 es
 uniform mat4 cameraFromObject;
@@ -94,4 +94,34 @@ void main() {
   float line = seen.a - withoutLine;
   painted = painted * (1.0 - rim) + vec4(0.0, 0.0, 0.0, rim);
   painted = painted * (1.0 - line) + vec4(color * line, line);
+}`;
+
+export const TEXTURED_VERTEX = `#version 300 es
+uniform mat4 cameraFromObject;
+uniform mat4 projection;
+in vec3 position;
+in vec4 color;
+in vec2 place;
+out vec3 inCamera;
+out vec3 ownColor;
+out vec2 inPicture;
+void main() {
+  inCamera = (cameraFromObject * vec4(position, 1.0)).xyz;
+  ownColor = color.rgb;
+  inPicture = place;
+  gl_Position = projection * vec4(inCamera, 1.0);
+}`;
+
+export const TEXTURED_FRAGMENT = `#version 300 es
+precision highp float;
+uniform sampler2D picture;
+uniform bool hasPicture;
+in vec3 inCamera;
+in vec3 ownColor;
+in vec2 inPicture;
+out vec4 painted;
+void main() {
+  vec3 normal = normalize(cross(dFdx(inCamera), dFdy(inCamera)));
+  float light = 0.5 + 0.5 * abs(dot(normal, normalize(inCamera)));
+  painted = vec4(light * (hasPicture ? texture(picture, inPicture).rgb : ownColor), 1.0);
 }`;

@@ -66,6 +66,6 @@ function item({ task_id: id, name, is_current: current, state, skip_reason: reas
   if (state !== "open") swatch.append(icon(state));
   const word = current ? "this one" : WORDS[state];
   const words = element("span", { className: "thing-state", title: reason ?? "" }, word);
-  const props = current ? { "aria-current": "page" } : { href: `/label/${id}` };
+  const props = current ? { "aria-current": "page" } : { href: `/label/${id}${location.search}` };
   return element("li", {}, element("a", props, swatch, element("span", { className: "thing-name" }, name), words));
 }

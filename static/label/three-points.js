@@ -4,9 +4,9 @@ import { post, put } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
 import { drawMarks } from "./marks.js";
 import { objectView } from "./object-view.js";
-import { sharedDrawing } from "./outline.js";
 import { placeOfPixel, scenePointing } from "./pointing.js";
 import { relativeTo } from "./pose.js";
+import { objectDrawing } from "./textured.js";
 
 const LEAST = 3;
 
@@ -20,7 +20,7 @@ export function threePointsPart(page) {
   let on = false;
   let view = null;
   let frames = [];
-  let meshUrl = null;
+  let object = null;
   let marking = Promise.resolve();
   let fitting = Promise.resolve();
 
@@ -28,16 +28,16 @@ export function threePointsPart(page) {
   byId("pairs-leave").addEventListener("click", leave);
   byId("pairs-back").addEventListener("click", takeBack);
 
-  function open(_task, scene, object) {
+  function open(_task, scene, itsObject) {
     frames = scene.frames;
-    meshUrl = object.outline_mesh_url;
+    object = itsObject;
   }
 
   const isOpen = () => page.registration()?.state === "open";
   const complete = () => Math.min(picked.object.length, picked.scene.length);
 
   async function use(wanted) {
-    if (wanted === on || (wanted && !(page.canMove() && meshUrl))) return;
+    if (wanted === on || (wanted && !(page.canMove() && object))) return;
     if (wanted) page.leaveMode();
     on = wanted;
     button.setAttribute("aria-pressed", on);
@@ -48,7 +48,7 @@ export function threePointsPart(page) {
   }
 
   async function showObject() {
-    const drawing = await sharedDrawing(meshUrl); // who opens it twice meanwhile gets one view all the same
+    const drawing = await objectDrawing(object); // who opens it twice meanwhile gets one view all the same
     view ??= objectView(byId("pairs-object"), drawing, { onPoint: pickOnObject, onTurn: markObject });
     if (view === null) throw new Error("Without WebGL 2 the object cannot be shown: no points can be clicked on it.");
     if (!on) return;

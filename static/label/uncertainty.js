@@ -4,7 +4,6 @@ import { get, put } from "../api.js";
 import { byId, element, setText } from "../dom.js";
 
 const DEGREES = 180 / Math.PI;
-const ANY_TURN = 150; // degrees to either side: as good as any
 const REMEMBERED = "snap6d.uncertainty";
 
 /** A part of the labelling page. */
@@ -28,7 +27,7 @@ export function uncertaintyPart(page) {
     if (wanted !== snapId || uncertainty.snap_id !== snapId) return;
     const { translation, rotation, unknown } = uncertainty;
     setText(byId("uncertainty-size"), `± ${millimetres(translation)}, ± ${degrees(rotation)}`);
-    byId("unknown-motions").replaceChildren(...unknown.map((motion, index) => element("li", {}, sentence(motion, axisName(unknown, index)))));
+    byId("unknown-motions").replaceChildren(...unknown.map(({ text }) => element("li", {}, text)));
     byId("uncertainty").hidden = false;
   }
 
@@ -57,21 +56,6 @@ export function uncertaintyPart(page) {
     { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, tool: "uncertainty" },
   ];
   return { title: "The machine", bindings, attach, draw };
-}
-
-/** Several axes have their numbers in the 3-D view. */
-const axisName = (unknown, index) => (unknown.length > 1 ? `the blue axis ${index + 1}` : "the blue axis");
-
-function sentence({ kind, motion, extent }, axis) {
-  const isTurn = motion === "turn";
-  if (kind === "other mode") {
-    return isTurn
-      ? `Turned by ${degrees(extent)} about ${axis} it fits as well.`
-      : `Shifted by ${millimetres(extent)} along ${axis} it fits as well.`;
-  }
-  if (!isTurn) return `Depth does not tell where along ${axis} it lies: ± ${millimetres(extent)}.`;
-  if (extent * DEGREES >= ANY_TURN) return `Depth does not tell the turn about ${axis} at all.`;
-  return `Depth does not tell the turn about ${axis}: ± ${degrees(extent)}.`;
 }
 
 const millimetres = (metres) => `${digits(metres * 1000)} mm`;

@@ -1,8 +1,9 @@
 /** Looking at the object from elsewhere. */
 
 import { post } from "../api.js";
+import { byId } from "../dom.js";
 
-/** A part of the labelling page. */
+/** A part of the labelling page; the view's element is told by the event `looked`. */
 export function viewsPart(page) {
   const buttons = [...document.querySelectorAll("[data-look]")];
   let asked = false;
@@ -13,8 +14,14 @@ export function viewsPart(page) {
   async function look(at) {
     if (asked || !canLook()) return;
     asked = true;
-    await post(page.path("look"), { at }).catch(page.message.problem);
-    asked = false;
+    try {
+      await post(page.path("look"), { at });
+      byId("view")?.dispatchEvent(new Event("looked"));
+    } catch (error) {
+      page.message.problem(error);
+    } finally {
+      asked = false;
+    }
   }
 
   function draw() {

@@ -1,15 +1,14 @@
 /** Objects: a list of a dataset's, and one of them turning, with its symmetries and what a lead decides of them. */
 
-import { showAccount } from "../account.js";
 import { get, getAll, put } from "../api.js";
 import { byId, element, icon, setText } from "../dom.js";
-import { sharedDrawing } from "../label/outline.js";
+import { objectDrawing } from "../label/textured.js";
 import { messageArea } from "../message.js";
+import { openPage } from "../page.js";
 import { axisText, groupText, isAlong, residualText } from "./axes.js";
 import { axisEditor, residualOf } from "./editor.js";
 import { stageOf } from "./stage.js";
 
-const NONE = { label: "Try again", run: () => location.reload() };
 const message = messageArea(byId("message"));
 const objectId = location.pathname.split("/").filter(Boolean)[1] ?? null;
 let isLead = false;
@@ -26,14 +25,11 @@ byId("add").addEventListener("click", () => editor.open());
 byId("stop").addEventListener("click", () => play(null, null));
 byId("spin").addEventListener("click", () => spin(byId("spin").getAttribute("aria-pressed") !== "true"));
 
-try {
-  const me = await showAccount();
-  isLead = me.role === "admin";
+await openPage(message, async ({ role }) => {
+  isLead = role === "admin";
   if (objectId === null) await goToOne();
   else await showPage();
-} catch (error) {
-  message.problem(error, NONE);
-}
+});
 
 /** `/objects?dataset_id=` leads to the first object that waits for a decision, or else the first. */
 async function goToOne() {
@@ -47,7 +43,7 @@ async function showPage() {
   item = await get(`/api/objects/${objectId}`);
   const [dataset, drawing] = await Promise.all([
     get(`/api/datasets/${item.dataset_id}`),
-    sharedDrawing(item.outline_mesh_url),
+    objectDrawing(item),
     showList(),
   ]);
   showNames(dataset);

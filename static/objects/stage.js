@@ -13,7 +13,7 @@ const REACH = 1.12; // of a drawn axis to either side of the middle, in radii
 const DEGREES = 180 / Math.PI;
 
 /**
- * Shows `drawing` (of `sharedDrawing`) on `canvas`; over it, on `rest`, the outline of the object at rest while a turn
+ * Shows `drawing` (of `objectDrawing`) on `canvas`; over it, on `rest`, the outline of the object at rest while a turn
  * is played, and its axes in the SVG `axes`. `onPoint` gets points clicked on the object at rest, `onTurned` the
  * degrees while a turn is played, null when it ends. Null where the browser has no WebGL 2.
  */

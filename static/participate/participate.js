@@ -45,21 +45,31 @@ byId("withdraw-dialog").addEventListener("close", () => {
 });
 window.addEventListener("pageshow", ({ persisted }) => persisted && location.reload()); // "back" from a task
 
+window.addEventListener("hashchange", () => signInByLink().then((signedIn) => signedIn && location.reload(), refuse));
+
 try {
   await signInByLink();
   await open();
 } catch (error) {
+  refuse(error);
+}
+
+function refuse(error) {
   byId("opening").hidden = true;
   setText(byId("no-entry-text"), error.message);
   showScreen("no-entry");
 }
 
-/** The secret must not stay in the address, from where it would reach the history. */
+/**
+ * Whether the address held a link's secret, which signs in; a link pasted into this tab does not load the page again.
+ * The secret must not stay in the address, from where it would reach the history.
+ */
 async function signInByLink() {
   const token = decodeURIComponent(location.hash.slice(1));
-  if (!token) return;
+  if (!token) return false;
   history.replaceState(null, "", location.pathname + location.search);
   await post("/api/sign-in/study", { token });
+  return true;
 }
 
 async function open() {
@@ -127,15 +137,17 @@ function whatComes() {
   return place.task.is_practice ? "Practice, which does not count" : `Task ${place.done + 1} of ${place.total}`;
 }
 
-function questionField({ text, choices }) {
+function questionField({ text, choices, optional }) {
+  const required = !optional;
+  const asked = [text, " ", element("small", {}, required ? "required" : "optional")];
   if (choices.length === 0) {
-    const input = element("input", { name: text, required: true, maxLength: 1000, autocomplete: "off" });
-    return element("label", { className: "field" }, element("span", {}, text), input);
+    const input = element("input", { name: text, required, maxLength: 1000, autocomplete: "off" });
+    return element("label", { className: "field" }, element("span", {}, ...asked), input);
   }
   const options = choices.map((choice) =>
-    element("label", {}, element("input", { type: "radio", name: text, value: choice, required: true }), choice),
+    element("label", {}, element("input", { type: "radio", name: text, value: choice, required }), choice),
   );
-  return element("fieldset", { className: "choices" }, element("legend", {}, text), ...options);
+  return element("fieldset", { className: "choices" }, element("legend", {}, ...asked), ...options);
 }
 
 function sendAnswers() {

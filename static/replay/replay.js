@@ -6,12 +6,13 @@
 
 import { get, post, put } from "../api.js";
 import { drawAssessment } from "../assessment.js";
-import { byId, icon, setText } from "../dom.js";
+import { byId, setText } from "../dom.js";
 import { setUpHelp } from "../label/help.js";
 import { imagePart } from "../label/image.js";
 import { keyBindings, releaseFocusAfterPointer } from "../label/keys.js";
 import { openView } from "../label/view.js";
 import { messageArea } from "../message.js";
+import { drawPoser } from "../posed-by.js";
 import { clockText, playbackClock } from "./clock.js";
 import { eventList } from "./events.js";
 import { presenter } from "./presenter.js";
@@ -67,11 +68,12 @@ async function open() {
   }
 }
 
-function showNames({ dataset, scene, object }, { operator, condition, state, is_simulated: simulated, seconds }) {
-  document.title = `Replay of ${object.name} · Snap6D`;
+function showNames({ dataset, scene, name }, { operator, condition, state, is_simulated: simulated, seconds }) {
+  document.title = `Replay of ${name} · Snap6D`;
   setText(byId("crumb-dataset"), dataset.name);
   setText(byId("crumb-scene"), scene.label);
-  setText(byId("crumb-object"), object.name);
+  setText(byId("crumb-object"), name);
+  setText(byId("title"), `Replay of ${name}`);
   setText(byId("crumb-operator"), `Replay of ${operator.name}`);
   byId("crumb-dataset").href = `/?dataset_id=${dataset.id}`;
   byId("crumb-scene").href = `/?dataset_id=${dataset.id}&scene_id=${scene.id}`;
@@ -126,7 +128,7 @@ function showAt(seconds) {
 
 function drawMoment(moment) {
   image.draw(moment);
-  const { ghost, confidence, assessment, to_last: toLast } = moment;
+  const { ghost, confidence, assessment, posed_by: poser, to_last: toLast } = moment;
   byId("ghost").hidden = ghost === null;
   if (ghost) {
     setText(byId("ghost-text"), `${ghost.on_offer ? "Offered by the machine" : "Put here by the machine"}, confidence `);
@@ -136,10 +138,7 @@ function drawMoment(moment) {
   const numbers = [`${(1000 * toLast.translation).toFixed(1)} mm`, `${(DEGREES * toLast.rotation).toFixed(1)}°`];
   setText(byId("distance"), `${numbers.join(" · ")} to the end`);
   const thought = assessment ? `, ${assessment.verdict}` : "";
-  const source = confidence === null ? "human" : "machine";
-  const words = confidence === null ? "posed by hand" : `posed by the machine, ${confidence.toFixed(2)}${thought}`;
-  byId("source").dataset.source = source;
-  byId("source").replaceChildren(icon(source), words);
+  drawPoser(byId("source"), poser, confidence === null ? "" : `, ${confidence.toFixed(2)}${thought}`);
 }
 
 function showPlaying(isPlaying) {

@@ -11,9 +11,12 @@ import { BOX, HEIGHT, scalesOf, WIDTH } from "./scales.js";
 const HINT = "Point at a curve, or move along it with the arrow keys; click or Enter opens a replay.";
 let made = 0;
 
-/** Series are {name, hand, mode, points}, points {margin, seconds, low, high, operators, trials, share, id}. */
-export function chart(title, error, series) {
-  const scales = scalesOf(series, error);
+/**
+ * Series are {name, hand, mode, points}, points {margin, seconds, low, high, operators, trials, share, id}; `compared`
+ * are all that are to have the same scales.
+ */
+export function chart(title, error, series, compared) {
+  const scales = scalesOf(compared, error);
   const mark = svg("circle", { class: "mark", r: 5 });
   mark.style.display = "none";
   const picture = svg(

@@ -1,4 +1,4 @@
-/** Numbers of reports as people read them. */
+/** Numbers of reports as people read them; no line is broken between a number and its unit. */
 
 const DEGREES = 180 / Math.PI;
 const NONE = "–";
@@ -12,14 +12,14 @@ export const unitOf = (error) => (error === "translation" ? "mm" : "°");
 export function errorText(value, error) {
   if (value === null) return NONE;
   const number = digits(inPeopleUnits(value, error));
-  return error === "translation" ? `${number} mm` : `${number}°`;
+  return error === "translation" ? `${number}\u00a0mm` : `${number}°`;
 }
 
 /** "12.3 s". */
-export const secondsText = (value) => (value === null ? NONE : `${digits(value)} s`);
+export const secondsText = (value) => (value === null ? NONE : `${digits(value)}\u00a0s`);
 
 /** "94 %". */
-export const shareText = (value) => (value === null ? NONE : `${Math.round(value * 100)} %`);
+export const shareText = (value) => (value === null ? NONE : `${Math.round(value * 100)}\u00a0%`);
 
 /** "4.2 mm (3.9 mm to 4.6 mm)" of {mean, low, high}; `text` writes one number. */
 export function intervalText({ mean, low, high }, text) {

@@ -9,9 +9,11 @@ import { replayLink, section, tableOf } from "./tables.js";
 export function drawPanels(cells, names, { errors, isSimulated }) {
   const shown = cells.filter(({ error }) => errors.includes(error));
   const keys = [...new Map(shown.map((cell) => [`${cell.group}, ${cell.error}`, cell])).entries()];
+  const seriesWhere = (isMeant) => shown.filter(isMeant).flatMap((cell) => seriesOf(cell, names));
   const panels = keys.map(([title, { group, error }]) => {
-    const series = shown.filter((cell) => cell.group === group && cell.error === error).flatMap((cell) => seriesOf(cell, names));
-    return chart(isSimulated ? `${title} · simulated` : title, error, series);
+    const compared = seriesWhere((cell) => cell.error === error); // groups are read off one scale
+    const series = seriesWhere((cell) => cell.group === group && cell.error === error);
+    return chart(isSimulated ? `${title} · simulated` : title, error, series, compared);
   });
   byId("panels").replaceChildren(...(panels.length ? panels : [element("p", { className: "panel" }, "There are no trials to show.")]));
   const legend = new Map(shown.flatMap((cell) => seriesOf(cell, names)).map((one) => [one.name, one]));

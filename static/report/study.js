@@ -6,7 +6,7 @@ import { count, METHODS } from "../format.js";
 import { ERROR_FIELD, errorsOf, setUpChoices } from "./choices.js";
 import { digits, errorText, intervalText, secondsText, shareText } from "./numbers.js";
 import { curvesSection, drawPanels, linesOf } from "./panels.js";
-import { remarksSection, section, tableOf } from "./tables.js";
+import { remarksSection, section, tableOf, withCaution } from "./tables.js";
 
 const NAMES = { human: "human", default: "STG", paper: "STG, paper’s filter" };
 const TABLES = ["curves", "fitts", "hand_off", "gains", "comparisons", "trials", "samples", "truths", "remarks"];
@@ -90,13 +90,13 @@ function rotation({ gains }) {
 
 function handOffs({ cells }) {
   const rows = cells.flatMap((cell) =>
-    Object.entries(cell.stg).map(([method, { hand_off: point }]) => {
+    Object.entries(cell.stg).flatMap(([method, { hand_off: point }]) => {
       const which = [...cellOf(cell), METHODS[method].name];
-      if (point === null) return [...which, "no margin: nothing is saved for sure", "–", "–"];
+      if (point === null) return [[...which, "no margin: nothing is saved for sure", "–", "–"]];
       const [low, high] = point.saved_interval;
       const saved = intervalText({ mean: point.saved, low, high }, secondsText);
       const from = `${errorText(point.margin, cell.error)}${point.is_largest ? " or more" : ""}`;
-      return [...which, from, errorText(point.best_margin, cell.error), saved];
+      return withCaution([...which, from, errorText(point.best_margin, cell.error), saved], point.caution);
     }),
   );
   const head = ["group", "mode", "condition", "error", "method", "let the machine take over from", "saves most at", "seconds saved there"];
@@ -105,16 +105,21 @@ function handOffs({ cells }) {
 
 function fitts({ cells }) {
   const rows = cells.flatMap((cell) =>
-    linesOf(cell)
-      .filter(({ fitts: line }) => line)
-      .map(({ hand, fitts: line }) => {
-        const told = (name) => intervalText({ mean: line[name], low: line[`${name}_interval`][0], high: line[`${name}_interval`][1] }, secondsText);
-        const bits = intervalText({ mean: line.throughput, low: line.throughput_interval[0], high: line.throughput_interval[1] }, digits);
-        return [...cellOf(cell), NAMES[hand], errorText(line.distance, cell.error), line.margins, told("a"), told("b"), digits(line.r_squared), bits];
-      }),
+    linesOf(cell).flatMap(({ hand, fitts: line, fitts_caution: caution }) =>
+      withCaution([...cellOf(cell), NAMES[hand], ...(line ? numbersOf(line, cell.error) : Array(6).fill("–"))], caution),
+    ),
   );
   const head = ["group", "mode", "condition", "error", "by", "D", "margins", "a", "b a bit", "R²", "bits/s"];
   return rows.length ? section("Fitts' law: time = a + b log2(D/W + 1)", tableOf(head, rows)) : null;
+}
+
+function numbersOf(line, error) {
+  const told = (name, text) => {
+    const [low, high] = line[`${name}_interval`];
+    return intervalText({ mean: line[name], low, high }, text);
+  };
+  const [a, b, bits] = [told("a", secondsText), told("b", secondsText), told("throughput", digits)];
+  return [errorText(line.distance, error), line.margins, a, b, digits(line.r_squared), bits];
 }
 
 function comparisons({ comparisons: pairs }) {

@@ -1,6 +1,6 @@
 /** Sections and tables of reports. */
 
-import { element } from "../dom.js";
+import { element, icon } from "../dom.js";
 
 /** A part of the page with a heading. */
 export function section(title, ...children) {
@@ -9,12 +9,21 @@ export function section(title, ...children) {
   return node;
 }
 
-/** A table; cells are texts, numbers or elements. */
+/** A table; cells are texts, numbers or elements. A row of one cell is about the row above, and as wide as the table. */
 export function tableOf(names, rows) {
   const head = element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)));
-  const body = rows.map((row) => element("tr", {}, ...row.map((cell) => element("td", {}, cell instanceof Node ? cell : String(cell)))));
+  const body = rows.map((row) => element("tr", {}, ...row.map((cell) => cellOf(cell, row.length === 1 ? names.length : 1))));
   const table = element("table", {}, element("thead", {}, head), element("tbody", {}, ...body));
   return element("div", { className: "table-frame", tabIndex: 0, role: "group" }, table);
+}
+
+function cellOf(content, colSpan) {
+  return element("td", { colSpan }, content instanceof Node ? content : String(content));
+}
+
+/** A row, and below it what there is to say against it; `text` is empty where there is nothing. */
+export function withCaution(row, text) {
+  return text ? [row, [element("p", { className: "caution" }, icon("alert"), text)]] : [row];
 }
 
 /** Leads to the replay of a registration; empty for none. */

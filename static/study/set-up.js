@@ -1,65 +1,78 @@
-/** Setting a study up: a form, and beside it the order that it leads to. */
+/** Setting a study up: a form, and beside it what it amounts to and the order that it leads to. */
 
 import { get, getAll, post } from "../api.js";
-import { byId, element, picture, setText } from "../dom.js";
-import { count, taskName } from "../format.js";
+import { byId, element, setText } from "../dom.js";
+import { count } from "../format.js";
 import { messageArea } from "../message.js";
+import { amountsOf, noteOn } from "./amounts.js";
+import { goToFirst, placedProblem, showProblems } from "./field-problems.js";
 import { showOrders } from "./orders.js";
+import { groupsOf, questionsOf } from "./plan-text.js";
+import { thingList } from "./things.js";
 
 const PAUSE_MS = 250; // after the last key, before the order is asked for
 
+/** What the words mean, beside each; a word that is not here stands alone. */
+const MEANINGS = {
+  accurate: "as accurately as they can; no clock is shown",
+  quick: "as quickly as they can; a clock is shown",
+  manual: "the handles alone, no machine: the baseline",
+  snap: "the handles, and Snap when they ask for it",
+  "paper snap": "the same by the paper’s filter, 5 to 10 s a snap",
+  auto: "Snap, and the machine takes over where it is sure",
+  "three points": "Snap, and placing by three pairs of points",
+  "click-to-place": "Snap, and placing by a click",
+  "live snap": "Snap, and a ghost where it would land",
+  "find it": "Snap, and the machine looks by itself",
+};
+
+/** Shows the form once all of it is there. */
 export async function showSetUp(pageMessage) {
+  const form = byId("set-up");
   const message = messageArea(byId("preview-message"));
-  const things = new Map(); // {ref, name, scene, url, use} of all datasets looked at; `use`: "", "task", "practice"
+  const things = thingList(() => changed("things"));
+  const touched = new Set(); // fields that were filled in: nobody is blamed for those that were not yet
+  let fromServer = ["", ""]; // what it last said of the form as it is: the field, and the sentence
   let waiting = null;
   let newest = 0;
 
-  const modes = await fillFromDescription();
+  const [modes, datasets, studies] = await Promise.all([
+    fillFromDescription(),
+    getAll("/api/datasets"),
+    getAll("/api/studies"),
+  ]);
+  const taken = new Set(studies.map(({ name }) => name));
   byId("seed").value = crypto.getRandomValues(new Uint32Array(1))[0] % 100000;
-  const datasets = await getAll("/api/datasets");
   byId("dataset").replaceChildren(...datasets.map(({ id, name }) => new Option(name, id)));
-  byId("dataset").addEventListener("change", () => showThings().catch(pageMessage.problem));
-  byId("set-up").addEventListener("input", later);
-  byId("set-up").addEventListener("submit", create);
+  byId("no-datasets").hidden = datasets.length > 0;
+  byId("choose-things").hidden = datasets.length === 0;
+  if (datasets.length) await loadThings();
+  byId("dataset").addEventListener("change", () => loadThings().catch(pageMessage.problem));
+  form.addEventListener("input", ({ target }) => target.closest("[data-search]") || changed(fieldOf(target)));
+  form.addEventListener("submit", create);
   setText(byId("crumb-study"), "New study");
   byId("crumb-study").hidden = false;
-  byId("set-up").hidden = false;
-  if (datasets.length) await showThings();
+  form.hidden = false;
+  await preview();
 
-  async function showThings() {
-    const tasks = await getAll("/api/tasks", { dataset_id: byId("dataset").value });
-    const keys = new Set(); // of tasks for one thing, in several modes and conditions, one stands for all
-    for (const thing of tasks.map(thingOf)) {
-      const key = keyOf(thing.ref);
-      keys.add(key);
-      if (!things.has(key)) things.set(key, thing);
+  async function loadThings() {
+    const wanted = byId("dataset").value;
+    byId("things").setAttribute("aria-busy", "true");
+    try {
+      const tasks = await getAll("/api/tasks", { dataset_id: wanted });
+      if (wanted === byId("dataset").value) things.show(tasks);
+    } finally {
+      if (wanted === byId("dataset").value) byId("things").removeAttribute("aria-busy");
     }
-    byId("things").replaceChildren(...[...keys].map((key) => thingRow(things.get(key))));
-    later();
-  }
-
-  function thingRow(thing) {
-    const choice = element(
-      "select",
-      { "aria-label": `${thing.name}, ${thing.scene}` },
-      new Option("not used", ""),
-      new Option("counts", "task"),
-      new Option("for practice", "practice"),
-    );
-    choice.value = thing.use;
-    choice.addEventListener("change", () => (thing.use = choice.value));
-    const text = element("span", {}, thing.name, element("small", {}, thing.scene));
-    return element("div", { className: "thing" }, picture(thing.url, "thing-picture", { lazy: true }), text, choice);
   }
 
   function plan() {
-    const used = (use) => [...things.values()].filter((thing) => thing.use === use).map(({ ref }) => ref);
     return {
       modes: ticked("modes"),
       conditions: ticked("conditions"),
       groups: Object.fromEntries(groupsOf(byId("groups").value)),
-      tasks: used("task"),
-      practice: used("practice"),
+      tasks: things.used("task"),
+      practice: things.used("practice"),
       consent: byId("consent").value,
       instructions: Object.fromEntries(modes.map((mode) => [mode, byId(`instructions-${mode}`).value])),
       questions: questionsOf(byId("questions").value),
@@ -67,43 +80,87 @@ export async function showSetUp(pageMessage) {
     };
   }
 
-  function later() {
-    const mine = ++newest;
-    const isNewest = () => mine === newest;
+  function changed(field) {
+    touched.add(field);
+    fromServer = ["", ""];
+    newest += 1; // whatever is still to be answered is out of date
     clearTimeout(waiting);
-    byId("create").disabled = true;
-    waiting = setTimeout(() => preview(isNewest).catch((error) => isNewest() && message.problem(error)), PAUSE_MS);
+    waiting = setTimeout(preview, PAUSE_MS);
+    showWhatIsWrong();
   }
 
-  /** Of several answers only the one to the form as it is now counts. */
-  async function preview(isNewest) {
+  /** By field, what is wrong with the form as it is. */
+  function problems() {
+    const own = { ...lacking(plan()), ...wrongText(taken) };
+    return Object.fromEntries(Object.entries({ [fromServer[0]]: fromServer[1], ...own }).filter(([, text]) => text));
+  }
+
+  function showWhatIsWrong() {
+    const told = Object.entries(problems()).filter(([field]) => touched.has(field));
+    showProblems(form, Object.fromEntries(told));
+    setText(byId("questions-read"), readBack(questionsOf(byId("questions").value)));
+  }
+
+  /** Of several answers only the one to the form as it is now counts; until it comes the last one stays, paler. */
+  async function preview() {
+    const mine = ++newest;
     message.clear();
-    byId("preview-orders").replaceChildren();
     const wanted = plan();
-    const lacks = missing(wanted, groupsOf(byId("groups").value));
-    setText(byId("preview-summary"), lacks ?? "");
-    if (lacks) return;
-    const answer = await post("/api/studies/preview", { plan: wanted, seed: Number(byId("seed").value) });
-    if (!isNewest()) return;
-    setText(byId("preview-summary"), summary(wanted, answer));
-    byId("preview-orders").replaceChildren(showOrders(answer.orders, nameOf));
-    byId("create").disabled = false;
+    const { name: _, ...ofPlan } = problems();
+    const lacks = Object.values(ofPlan)[0];
+    if (lacks) {
+      showAmounts(lacks);
+      return;
+    }
+    byId("preview").setAttribute("aria-busy", "true");
+    try {
+      const answer = await post("/api/studies/preview", { plan: wanted, seed: Number(byId("seed").value) });
+      if (mine === newest) showAmounts(null, wanted, answer);
+    } catch (error) {
+      if (mine === newest) refused(error);
+    }
   }
 
-  function nameOf(ref) {
-    const { name, scene } = things.get(keyOf(ref));
-    return `${name}, ${scene}`;
+  function showAmounts(lacks, wanted, answer) {
+    const notes = lacks ? { time: lacks, order: "" } : noteOn(wanted, answer);
+    byId("preview").removeAttribute("aria-busy");
+    byId("amounts").replaceChildren(...(lacks ? [] : amountsOf(wanted, answer)));
+    byId("preview-orders").replaceChildren(...(lacks ? [] : [showOrders(answer.orders, things.nameOf)]));
+    setText(byId("preview-summary"), notes.time);
+    setText(byId("order-note"), notes.order);
+    byId("order").hidden = Boolean(lacks);
+  }
+
+  /** What the server says is shown at the field, or where it is about none, below the order. */
+  function refused(error) {
+    const [field, text] = placedProblem(error.message);
+    if (!byId(`${field}-problem`)) {
+      showAmounts("The order is shown once this is mended.");
+      message.show(text, "problem");
+      return;
+    }
+    fromServer = [field, text];
+    touched.add(field);
+    showWhatIsWrong();
+    showAmounts(text);
   }
 
   async function create(event) {
     event.preventDefault();
+    const wrong = problems();
+    for (const field of Object.keys(wrong)) touched.add(field);
+    showWhatIsWrong();
+    if (Object.keys(wrong).length) {
+      goToFirst(form);
+      return;
+    }
     byId("create").disabled = true;
     try {
       const body = { name: byId("name").value, plan: plan(), seed: Number(byId("seed").value) };
       const { id } = await post("/api/studies", body);
       location.assign(`/studies?study=${id}`);
     } catch (error) {
-      message.problem(error);
+      refused(error);
       byId("create").disabled = false;
     }
   }
@@ -115,7 +172,7 @@ async function fillFromDescription() {
   const plan = components.schemas.StudyPlan.properties;
   for (const name of ["modes", "conditions"]) {
     const { items, default: first } = plan[name];
-    byId(name).replaceChildren(...items.enum.map((value) => tick(name, value, first.includes(value))));
+    byId(`${name}-ticks`).replaceChildren(...items.enum.map((value) => tick(name, value, first.includes(value))));
   }
   const modes = plan.modes.items.enum;
   for (const mode of modes) byId(`instructions-${mode}`).value = plan.instructions.default[mode];
@@ -124,62 +181,53 @@ async function fillFromDescription() {
   return modes;
 }
 
-function thingOf(task) {
-  const ref = { scene_id: task.scene.id, object_id: task.object.id, instance: task.instance };
-  return { ref, name: taskName(task), scene: task.scene.label, url: task.thumbnail_url, use: "" };
-}
-
-const keyOf = ({ scene_id: scene, object_id: object, instance }) => `${scene} ${object} ${instance}`;
-
 function tick(group, name, checked) {
   const box = element("input", { type: "checkbox", name: group, value: name, checked });
-  return element("label", {}, box, name);
+  const meaning = element("small", {}, MEANINGS[name] ?? "");
+  return element("label", {}, box, element("span", {}, name, " ", meaning));
 }
 
 function ticked(group) {
   return [...document.querySelectorAll(`[name="${group}"]:checked`)].map(({ value }) => value);
 }
 
-/** "novice 8, expert 8" as [["novice", 8], ["expert", 8]]. */
-function groupsOf(text) {
-  const parts = text.split(",").map((part) => part.trim()).filter(Boolean);
-  return parts.map((part) => {
-    const [, name, size] = part.match(/^(.*?)\s*(\d+)$/) ?? [null, part, "0"];
-    return [name, Number(size)];
-  });
+/** The field that an input belongs to: its own, or the group of ticks. */
+const fieldOf = (input) => input.name || input.id;
+
+/** By field, what a plan still lacks. */
+function lacking({ modes, conditions, tasks }) {
+  return {
+    things: tasks.length ? "" : "Choose at least one object that counts: then times and order stand here.",
+    modes: modes.length ? "" : "Tick at least one mode.",
+    conditions: conditions.length ? "" : "Tick at least one condition.",
+  };
 }
 
-/** "Handedness: left, right" as {text: "Handedness", choices: ["left", "right"]}, a line each. */
-function questionsOf(text) {
-  const lines = text.split("\n").map((line) => line.trim()).filter(Boolean);
-  return lines.map((line) => {
-    const [question, choices = ""] = line.split(/:(.*)/s);
-    return { text: question.trim(), choices: choices.split(",").map((choice) => choice.trim()).filter(Boolean) };
-  });
+/** By field, what cannot be read as it is written. */
+function wrongText(taken) {
+  const name = byId("name").value.trim();
+  const whole = (id, words) => (byId(id).validity.valid ? "" : `Write a whole number ${words}.`);
+  return {
+    name: name ? (taken.has(name) ? `There already is a study “${name}”: choose another name.` : "") : "Give the study a name.",
+    groups: wrongGroups(groupsOf(byId("groups").value)),
+    "break-after": whole("break-after", "from 0 to 1000; 0 means no breaks"),
+    seed: whole("seed", "from 0 on"),
+  };
 }
 
-/** What the form still lacks, or null. */
-function missing({ modes, conditions, tasks }, groups) {
-  if (!tasks.length) return "Choose at least one thing that counts: then the order is shown here.";
-  if (!modes.length || !conditions.length) return "Tick at least one mode and one condition.";
+function wrongGroups(groups) {
   if (!groups.length || groups.some(([name, size]) => !name || size < 1)) {
-    return "Write each group with its number of operators, such as “novice 8, expert 8”.";
+    return "Write each group with its number of participants, such as “novice 8, expert 8”.";
   }
   const names = groups.map(([name]) => name);
   const twice = names.find((name, index) => names.indexOf(name) < index);
-  if (twice) return `The group “${twice}” is there twice: write each once.`;
-  return null;
+  return twice ? `The group “${twice}” is there twice: write each once.` : "";
 }
 
-function summary({ groups, practice, conditions, tasks, modes }, { rows_of_balance: rows, orders }) {
-  const each = tasks.length * modes.length * conditions.length;
-  const trying = practice.length * conditions.length;
-  const uneven = Object.entries(groups).filter(([, size]) => size % rows).map(([name]) => name);
-  const trials = trying ? `${count(trying, "task")} for practice, then ${each} that count` : count(each, "task");
-  const balance = uneven.length
-    ? `For an even balance groups need a multiple of ${rows} operators; that is not so for ${uneven.join(", ")}.`
-    : "The order is balanced evenly.";
-  const isCut = Math.max(...Object.values(groups)) > orders.length;
-  const shown = isCut ? ` Shown are the first ${orders.length}; the others follow in the same way.` : "";
-  return `Each operator does ${trials}. Operator 1 is the first one of each group, and so on.${shown} ${balance}`;
+/** How the questions were understood. */
+function readBack(questions) {
+  if (!questions.length) return "";
+  const free = questions.filter(({ choices }) => !choices.length).length;
+  const optional = questions.filter((question) => question.optional).length;
+  return `Read as ${count(questions.length, "question")}: ${questions.length - free} with choices, ${free} free; ${optional} optional.`;
 }

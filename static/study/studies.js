@@ -1,23 +1,20 @@
 /** Studies, for administrators: the list (/studies), setting one up (?new), and one of them (?study=ID). */
 
-import { showAccount } from "../account.js";
 import { getAll } from "../api.js";
 import { byId, element } from "../dom.js";
 import { messageArea } from "../message.js";
+import { openPage } from "../page.js";
 import { showSetUp } from "./set-up.js";
 import { showStudy } from "./study.js";
 
 const message = messageArea(byId("message"));
 
-try {
-  await showAccount();
+await openPage(message, async () => {
   const asked = new URLSearchParams(location.search);
   if (asked.has("new")) await showSetUp(message);
   else if (asked.has("study")) await showStudy(asked.get("study"), message);
   else await showList();
-} catch (error) {
-  message.problem(error, { label: "Try again", run: () => location.reload() });
-}
+});
 
 async function showList() {
   const studies = await getAll("/api/studies");

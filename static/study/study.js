@@ -56,6 +56,8 @@ export async function showStudy(id, message) {
     setText(byId("study-state"), state);
     byId("study-simulated").hidden = !simulated;
     byId("report").href = `/report/${id}`;
+    byId("answers").href = `${url}/answers.csv`;
+    byId("answers").hidden = plan.questions.length === 0;
     byId("close-study").hidden = !isOpen;
     const each = `${tasks.length * modes.length * conditions.length} tasks each`;
     setText(byId("study-about"), [conditions.join(", "), modes.join(", "), each, `seed ${seed}`].join(" · "));
@@ -75,7 +77,7 @@ export async function showStudy(id, message) {
     const props = { className: "human", max: total || 1, value: done, "aria-label": `Progress of ${code}` };
     const said = Object.entries(answers ?? {}).flatMap(([question, answer]) => [
       element("dt", {}, question),
-      element("dd", {}, answer),
+      element("dd", {}, answer ?? element("em", { className: "muted" }, "left empty")),
     ]);
     const cells = [
       [element("strong", {}, code)],
@@ -129,11 +131,11 @@ function button(content, className, run, disabled = false) {
   return node;
 }
 
-function stateOf({ withdrawn_at: withdrawn, finished_at: finished, consented_at: consented, done }) {
+function stateOf({ withdrawn_at: withdrawn, finished_at: finished, consented_at: consented, answers, done }) {
   let [name, text] = ["open", "invited"];
   if (withdrawn) [name, text] = ["skipped", "withdrawn"];
   else if (finished) [name, text] = ["submitted", "finished"];
-  else if (consented || done) [name, text] = ["in_progress", "under way"];
+  else if (consented || answers || done) [name, text] = ["in_progress", "under way"];
   return element("span", { className: "state" }, icon(name), text);
 }
 

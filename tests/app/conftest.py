@@ -11,7 +11,6 @@ from subprocess import CompletedProcess
 import dask
 import httpx
 import pytest
-from distributed import LocalCluster
 
 import app.cli
 from app.auth import Role
@@ -20,17 +19,55 @@ from app.database import Database
 from app.importing import import_dataset
 from app.main import create_services
 from app.services import Services
+from app.snapping import start_workers
 from app.storage import FileStore
+from tests.app import postgres
 from tests.app.live import LiveServer, running_server
 from tests.app.small_dataset import NAME, write_small_dataset
 from tests.processes import Command
 
+# pytest hangs what captures logs on loggers that keep theirs to themselves, and Dask, whose loggers do,
+# silences whatever hangs on them for as long as a cluster lives: no test would see a log any more
+for name in ("distributed", "bokeh"):
+    logging.getLogger(name).propagate = True
+
+
+ON_BOTH_DATABASES = {f"tests.app.test_{name}" for name in ("auth", "event_log", "importing")}
+"""Modules whose tests of a database run on SQLite and on PostgreSQL."""
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Let tests of these modules have each database."""
+    if "database" in metafunc.fixturenames and metafunc.module.__name__ in ON_BOTH_DATABASES:
+        metafunc.parametrize("database", ["sqlite", "postgresql"], indirect=True)
+
+
+@pytest.fixture(scope="session")
+def postgres_server() -> Iterator[str]:
+    """Address of a PostgreSQL server."""
+    with postgres.postgres_server() as address:
+        yield address
+
+
+@pytest.fixture(scope="session")
+def postgres_template(postgres_server: str) -> str:
+    """Name of an empty database with its tables on that server; to be copied."""
+    url = postgres.new_database(postgres_server)
+    template = Database(url)
+    template.migrate()
+    template.close()
+    return url.rpartition("/")[2]
+
 
 @pytest.fixture
-def database(tmp_path: Path) -> Iterator[Database]:
+def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Database]:
     """An empty database with its tables."""
-    opened = Database(f"sqlite:///{tmp_path / 'snap6d.sqlite'}")
-    opened.migrate()
+    if getattr(request, "param", "sqlite") == "postgresql":
+        server, template = (request.getfixturevalue(f"postgres_{name}") for name in ("server", "template"))
+        opened = Database(postgres.new_database(server, template))
+    else:
+        opened = Database(f"sqlite:///{tmp_path / 'snap6d.sqlite'}")
+        opened.migrate()
     yield opened
     opened.close()
 
@@ -55,19 +92,15 @@ def demo_copy(demo: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def cluster() -> Iterator[str]:
-    """Address of a scheduler with two workers."""
-    dask.config.set({"distributed.scheduler.allowed-failures": 0, "distributed.scheduler.worker-ttl": None})
-    with LocalCluster(
-        n_workers=2,
-        threads_per_worker=1,
-        host="127.0.0.1",
-        dashboard_address="127.0.0.1:0",
-        worker_dashboard_address="127.0.0.1:0",
-        memory_limit=0,
-        preload=["app.worker"],
-        silence_logs=logging.ERROR,
-    ) as started:
-        yield started.scheduler_address
+    """Address of a scheduler with two workers, whose certificates Dask's configuration names."""
+    with start_workers(2) as started:
+        certificates = {
+            "ca-file": started.security.tls_ca_file,
+            "client.key": started.security.tls_client_key,
+            "client.cert": started.security.tls_client_cert,
+        }
+        with dask.config.set({f"distributed.comm.tls.{key}": text for key, text in certificates.items()}):
+            yield started.scheduler_address
 
 
 @pytest.fixture(scope="session")

@@ -1,17 +1,21 @@
 """What an import has left behind."""
 
-import sqlite3
+from sqlalchemy import select
 
 from app.database import Database
 from app.importing import ImportSummary
 from app.storage import FileStore
+from app.tables import Base
 
 
 def everything(database: Database, files: FileStore) -> tuple[list[str], set[str]]:
     """All rows and all files."""
-    connection = sqlite3.connect(str(database.engine.url.database))
-    rows = list(connection.iterdump())
-    connection.close()
+    with database.engine.connect() as connection:
+        rows = [
+            f"{table.name} {row!r}"
+            for table in Base.metadata.sorted_tables
+            for row in connection.execute(select(table).order_by(*table.primary_key.columns))
+        ]
     return rows, {path.name for path in files.root.rglob("*") if path.is_file()}
 
 

@@ -10,6 +10,7 @@ import uvicorn
 
 from app.api.dependencies import SESSION_COOKIE
 from app.auth import Role
+from app.connections import server_config
 from app.labeling.seat import Seat
 from app.main import create_app
 from app.services import Services
@@ -64,12 +65,12 @@ class LiveServer:
 @contextmanager
 def running_server(services: Services) -> Iterator[LiveServer]:
     """Serve on a free port until the block ends; the services end with it."""
-    config = uvicorn.Config(
+    config = server_config(
         create_app(services),
+        services.settings,
         host="127.0.0.1",
         port=0,
         log_level="critical",
-        ws_max_size=64 * 2**20,
         timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)

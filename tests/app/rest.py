@@ -46,7 +46,7 @@ def sentence(answer: httpx.Response, status: int) -> str:
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     content = answer.json()
-    assert set(content) == {"type", "title", "status", "detail"}
+    assert set(content) - {"suggested"} == {"type", "title", "status", "detail"}
     assert content["status"] == status
     assert isinstance(content["detail"], str) and content["detail"].endswith(".")
     assert "\n" not in content["detail"]

@@ -79,6 +79,24 @@ def test_a_new_user_gets_a_link(snap6d, state):
     assert "already is a user named 'ann'" in failure(snap6d(state, "user", "add", "ann"))
 
 
+def test_a_name_that_looks_like_markup_is_a_name(snap6d, state):
+    added = snap6d(state, "user", "add", "[/x] [bold]")
+    assert added.returncode == 0, added.stderr
+    assert "User [/x] [bold] may sign in" in added.stdout
+
+
+def test_an_import_says_what_looked_odd(snap6d, state, shared_cases):
+    done = snap6d(state, "import", str(shared_cases / "55-pose-in-opengl-axes"))
+    assert done.returncode == 0, done.stderr
+    assert "Odd: object 1 lies behind the camera" in done.stdout and "(test/000001, image 0)" in done.stdout
+
+
+def test_an_import_takes_another_depth_scale(snap6d, state, shared_cases):
+    case = str(shared_cases / "22-depth-scale-in-metres")
+    assert "import with depth scale 1" in failure(snap6d(state, "import", case))
+    assert snap6d(state, "import", case, "--depth-scale", "1").returncode == 0
+
+
 def test_who_is_there_already_gets_another_link(snap6d, state):
     snap6d(state, "user", "add", "ann", "--role", "reviewer")
     printed = snap6d(state, "user", "link", "ann").stdout.splitlines()

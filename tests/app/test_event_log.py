@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
 
 from app.auth import Actor
 from app.clock import BOOT_ID
 from app.database import Database
-from app.event_log import EventLog, NewEvent
+from app.event_log import ErasedError, EventLog, NewEvent
 from app.importing import import_dataset
 from app.storage import FileStore
+from app.study.erasing import erase_registrations
 from app.tables import EstimateRow, Registration, Task, User
 from registration_core import pose
 
@@ -114,7 +116,7 @@ def test_an_event_and_its_estimate_come_together_or_not_at_all(log, registration
     found = log.estimate("s1")
     assert found is not None and found.seed == 2**62 and found.hypotheses[0]["weight"] == 1.0
     assert [row.kind for row in log.snap_events("s1")] == ["snap_requested", "snap_applied"]
-    with pytest.raises(Exception, match="UNIQUE"):
+    with pytest.raises(IntegrityError, match=r"(?i)unique"):
         log.append(registrations[0], 1, applied, estimate("s1", registrations[0]))
     assert len(log.events(registrations[0])) == 2
 
@@ -146,6 +148,19 @@ def test_a_skip_closes_the_registration_without_a_pose_and_reopening_clears_all(
     assert closed() == reopened
 
 
-def test_an_event_of_nobody_is_refused(log):
-    with pytest.raises(Exception, match="FOREIGN KEY"):
+def test_an_event_of_nobody_is_refused(log, registrations):
+    with pytest.raises(ErasedError, match="registration 99 was erased"):
         log.append(99, 99, NewEvent("opened", Actor.HUMAN))
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"):
+        log.append(registrations[0], 99, NewEvent("opened", Actor.HUMAN))
+
+
+def test_what_was_erased_is_not_gone_on_with(database, log, registrations):
+    erased, kept = registrations[0], registrations[1]
+    log.append(erased, 1, NewEvent("opened", Actor.HUMAN))
+    with database.write() as session:
+        erase_registrations(session, 1)
+    for registration_id in (erased, kept):
+        with pytest.raises(ErasedError, match=f"registration {registration_id} was erased"):
+            log.append(registration_id, 1, NewEvent("undo", Actor.HUMAN))
+        assert log.events(registration_id) == []

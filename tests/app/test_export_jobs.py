@@ -2,19 +2,22 @@
 
 import os
 import signal
+import sqlite3
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from app.auth import Actor
 from app.config import Settings
 from app.database import Database
 from app.event_log import EventLog, NewEvent
-from app.export_jobs import DIED, INTERRUPTED, ExportJobs
+from app.export_jobs import DIED, INTERRUPTED, UNFINISHED, ExportJobs
 from app.storage import FileStore
 from app.tables import Export, Registration, User
+from app.unfinished import PREFIX
 from tests.app.small_dataset import TOOL, true_pose
 from tests.app.waiting import wait_until
 from tests.processes import command_line, descendants
@@ -73,6 +76,11 @@ def export_process(export: Export) -> int:
     return wait_until(look, "the export's process")
 
 
+def half_written(settings: Settings) -> set[Path]:
+    """Folders of what is not finished."""
+    return set(settings.files_dir.glob(f"{PREFIX}*"))
+
+
 def test_an_export_ends_with_a_zip_in_the_store(jobs, database, settings):
     export = jobs.start(1, "bop", 1)
     assert (export.state, export.progress, export.file_hash) == ("queued", 0.0, None)
@@ -90,12 +98,29 @@ def test_an_export_of_nothing_fails_with_a_sentence(jobs, database):
     assert failed.state == "failed" and "submit at least one" in failed.message
 
 
-def test_a_process_that_dies_fails_its_export_and_the_next_one_works(jobs, database):
+def test_a_process_that_dies_fails_its_export_and_the_next_one_works(jobs, database, settings):
     first, second = jobs.start(1, "bop", 1), jobs.start(1, "bop", 1)
+    folders = wait_until(lambda: half_written(settings), "the export to write something")
     os.kill(export_process(first), signal.SIGKILL)
     failed = ended(database, first)
     assert (failed.state, failed.message, failed.file_hash) == ("failed", DIED, None)
+    assert not folders & half_written(settings)
     assert ended(database, second).state == "done"
+
+
+def test_a_death_that_cannot_be_written_down_is_told_later(jobs, database, monkeypatch):
+    def refuse(*_arguments: object) -> None:
+        raise OperationalError("UPDATE exports", {}, sqlite3.OperationalError("database or disk is full"))
+
+    monkeypatch.setattr("app.export_jobs.SECONDS_BETWEEN_TRIES", 0.01)
+    export = jobs.start(1, "bop", 1)
+    process = export_process(export)
+    with monkeypatch.context() as full:
+        full.setattr(jobs, "_fail", refuse)
+        os.kill(process, signal.SIGKILL)
+        wait_until(lambda: not command_line(process), "the export to be gone")
+        assert row(database, export).state in UNFINISHED
+    assert ended(database, export).message == DIED
 
 
 def test_exports_go_one_after_the_other(jobs, database):

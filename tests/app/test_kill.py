@@ -1,5 +1,7 @@
-"""A server that is killed loses at most the drag that was not finished."""
+"""A server that is killed loses at most the drag that was not finished, and what it started ends with it."""
 
+import contextlib
+import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,10 +13,14 @@ import numpy as np
 import pytest
 
 from app.api.dependencies import SESSION_COOKIE
+from app.config import Settings
+from app.export_jobs import INTERRUPTED
+from app.unfinished import PREFIX
 from registration_core import pose
 from tests.app.export.site import TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import ViserClient
-from tests.app.rest import begin, log_of
+from tests.app.rest import begin, log_of, put_pose
+from tests.app.small_dataset import true_pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.processes import Server, command_line, descendants, serving
 
@@ -46,9 +52,37 @@ class Operator:
     def kill(self) -> None:
         """Kill the server, as a crash or a power cut would end it; its workers go too."""
         workers = descendants(self.server.process.pid)
-        self.server.process.send_signal(signal.SIGKILL)
-        assert self.server.process.wait(LONGEST) == -signal.SIGKILL
+        kill_alone(self.server)
         wait_until(lambda: not any(map(command_line, workers)), "the workers to go")
+
+
+def kill_alone(server: Server) -> None:
+    """Kill a server's process, and none of those that it started."""
+    server.process.send_signal(signal.SIGKILL)
+    assert server.process.wait(LONGEST) == -signal.SIGKILL
+
+
+@contextmanager
+def signed_in(state_dir: Path) -> Iterator[tuple[Server, httpx.Client]]:
+    """A server, and its administrator."""
+    with (
+        serving(state_dir, "--workers", "1") as server,
+        httpx.Client(base_url=server.url, timeout=LONGEST) as http,
+    ):
+        assert http.post("/api/sign-in/link", json={"token": server.secret}).status_code == 204
+        yield server, http
+
+
+def half_done_export(server: Server, http: httpx.Client) -> int:
+    """The process of an export that is under way, at a standstill."""
+    registration = begin(http)
+    assert put_pose(http, registration, true_pose(TOOL)).status_code == 200
+    assert http.post(f"/api/registrations/{registration['id']}/submit").status_code == 200
+    assert http.post("/api/exports", json={"dataset_id": 1, "format": "bop"}).status_code == 202
+    wait_until(lambda: http.get("/api/exports/1").json()["state"] == "running", "the export to run")
+    (process,) = (pid for pid in descendants(server.process.pid) if "app.export" in command_line(pid))
+    os.kill(process, signal.SIGSTOP)
+    return process
 
 
 @contextmanager
@@ -126,3 +160,32 @@ def test_killed_amid_a_flood_of_drags(state_dir: Path, cookie: dict[str, str]) -
         assert np.allclose(operator.state["T_world_object"], drags[-1]["T_after"])
         undone = operator.http.post(f"{operator.url}/undo").json()
         assert np.allclose(undone["T_world_object"], drags[-1]["T_before"])
+
+
+def test_an_export_ends_with_its_server(state_dir: Path) -> None:
+    with signed_in(state_dir) as (server, http):
+        process = half_done_export(server, http)
+        kill_alone(server)
+    os.kill(process, signal.SIGCONT)
+    wait_until(lambda: not command_line(process), "the export to end")
+    with signed_in(state_dir) as (_, http):
+        ended = http.get("/api/exports/1").json()
+        assert ended["state"] == "failed" and "start it again" in ended["message"].lower()
+    assert not list(Settings(state_dir=state_dir).files_dir.glob(f"{PREFIX}*"))
+
+
+def test_an_export_that_outlives_its_server_stays_failed(state_dir: Path) -> None:
+    with signed_in(state_dir) as (server, http):
+        process = half_done_export(server, http)
+        kill_alone(server)
+    try:
+        with signed_in(state_dir) as (_, http):
+            given_up = http.get("/api/exports/1").json()
+            assert (given_up["state"], given_up["message"]) == ("failed", INTERRUPTED)
+            os.kill(process, signal.SIGCONT)
+            wait_until(lambda: not command_line(process), "the export to end")
+            assert http.get("/api/exports/1").json() == given_up
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(process, signal.SIGKILL)
+    assert not list(Settings(state_dir=state_dir).files_dir.glob(f"{PREFIX}*"))

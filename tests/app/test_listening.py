@@ -1,11 +1,12 @@
 """The one public port and its address."""
 
+import asyncio
 import socket
 
 import pytest
 
 from app.config import Settings
-from app.listening import sign_in_link
+from app.listening import listen, sign_in_link
 from tests.processes import failure, run_snap6d
 
 
@@ -35,3 +36,22 @@ def test_a_port_in_use_is_said_before_anything_is_started(tmp_path):
 def test_an_address_of_another_machine_is_said(tmp_path):
     message = failure(run_snap6d(tmp_path, "serve", "--host", "192.0.2.7", "--port", "0"))
     assert message.startswith("port 0 on 192.0.2.7 cannot be used")
+
+
+def test_answers_do_not_wait_to_be_gathered_into_larger_packets():
+    async def accepted() -> int:
+        found: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+        async def greet(_reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            connection = writer.get_extra_info("socket")
+            found.set_result(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+            writer.close()
+
+        listener = listen(Settings(port=0))
+        async with await asyncio.start_server(greet, sock=listener):
+            _, writer = await asyncio.open_connection(*listener.getsockname())
+            no_delay = await found
+            writer.close()
+        return no_delay
+
+    assert asyncio.run(accepted()) != 0

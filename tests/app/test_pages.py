@@ -73,7 +73,9 @@ def test_strangers_are_sent_to_sign_in_and_back(live: LiveServer, path: str, wan
     ],
 )
 def test_who_is_signed_in_gets_the_page(live: LiveServer, path: str, title: str) -> None:
-    answer = live.person("a reader of pages").get(path)
+    reader = live.person("a reader of pages")
+    begin(reader)  # the first registration, to be replayed
+    answer = reader.get(path)
     assert answer.status_code == 200
     assert answer.headers["content-type"].startswith("text/html")
     found = re.search("<title>(.*)</title>", answer.text)
@@ -91,6 +93,36 @@ def test_after_signing_out_the_pages_are_closed(live: LiveServer) -> None:
 )
 def test_there_is_no_other_page(live: LiveServer, path: str) -> None:
     sentence(live.person("a reader of pages").get(path), 404)
+
+
+UNKNOWN = [
+    "/nothing",
+    "/label",
+    "/label/abc",
+    "/label/999999",
+    "/label/99999999999999999999",
+    "/label/\u0663",
+    "/label/1/2",
+    "/objects/999999",
+    "/replay/999999",
+    "/report/999999",
+    "/report/nobody",
+]
+
+
+@pytest.mark.parametrize("path", UNKNOWN)
+def test_an_unknown_page_says_so_and_leads_home(live: LiveServer, path: str) -> None:
+    person = live.person("a reader of pages")
+    answer = person.get(path, headers={"accept": "text/html,*/*;q=0.8"})
+    assert answer.status_code == 404
+    assert "There is no such page" in answer.text and 'href="/"' in answer.text
+    assert answer.headers["content-security-policy"] == CONTENT_SECURITY_POLICY
+    sentence(person.get(path), 404)  # to a program
+
+
+@pytest.mark.parametrize("path", ["/api/nothing", "/static/nothing.js"])
+def test_what_is_for_programs_answers_them_in_a_browser_too(live: LiveServer, path: str) -> None:
+    sentence(live.person("a reader of pages").get(path, headers={"accept": "text/html"}), 404)
 
 
 # -- headers

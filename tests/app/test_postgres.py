@@ -1,10 +1,6 @@
 """The same tables and sessions on PostgreSQL, where its server is installed."""
 
-import os
-import shutil
-import socket
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -13,43 +9,24 @@ from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from app.auth import Actor, Auth, Role
+from app.backup import BackupError, back_up
+from app.checkup import examine
 from app.config import Settings
-from app.database import Database
+from app.database import Database, DatabaseError
 from app.importing import import_dataset
 from app.main import create_services
 from app.storage import FileStore
+from app.stored_files import open_store
 from app.study.erasing import erase_registrations
+from tests.app.postgres import new_database
 from tests.app.waiting import wait_until
+from tests.processes import failure, run_snap6d
 
 
 @pytest.fixture(scope="module")
-def postgres_url() -> Iterator[str]:
-    """Address of an empty database on a server of its own, which listens on the loopback."""
-    programs = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
-    if not programs:
-        pytest.skip("PostgreSQL's server is not installed (Debian: apt-get install postgresql)")
-    folder = Path(subprocess.check_output(["mktemp", "-d"], text=True).strip())
-    as_owner: list[str] = []
-    if os.geteuid() == 0:  # the server refuses to run as root
-        shutil.chown(folder, "postgres")
-        as_owner = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"]
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-
-    def run(program: str, *arguments: str) -> None:
-        command = [*as_owner, str(programs[-1] / program), *arguments]
-        subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
-
-    data = str(folder / "data")
-    run("initdb", "-D", data, "-A", "trust", "-U", "snap6d")
-    options = f"-p {port} -k {folder} -c listen_addresses=127.0.0.1"
-    run("pg_ctl", "-D", data, "-o", options, "-l", str(folder / "log"), "-w", "start")
-    try:
-        yield f"postgresql+psycopg://snap6d@127.0.0.1:{port}/postgres"
-    finally:
-        run("pg_ctl", "-D", data, "-m", "immediate", "-w", "stop")
-        shutil.rmtree(folder)
+def postgres_url(postgres_server: str) -> str:
+    """Address of an empty database."""
+    return new_database(postgres_server)
 
 
 def refuses_changes(database: Database) -> None:
@@ -94,3 +71,63 @@ def test_a_registration_on_postgresql_and_its_erasing(
         services.export_jobs.close()
         services.snapper.close()
         services.database.close()
+
+
+def test_a_backup_of_postgresql_is_restored_into_another_database(
+    postgres_url: str, demo: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    database = Database(postgres_url)
+    database.migrate()
+    files = FileStore(tmp_path / "files")
+    import_dataset(database, files, demo, "kept")
+    archive = tmp_path / "backup.tar"
+    back_up(database, files, archive, lambda share, what: None)
+    with database.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+        connection.execute(text("CREATE DATABASE another"))
+    (tmp_path / "again").mkdir()
+    subprocess.run(["tar", "-xf", archive, "-C", tmp_path / "again"], check=True)
+    url = postgres_url.rpartition("/")[0].replace("+psycopg", "") + "/another"
+    restore = ["pg_restore", "--no-owner", f"--dbname={url}", str(tmp_path / "again/snap6d.pgdump")]
+    subprocess.run(restore, check=True)
+    other = Database(url.replace("postgresql", "postgresql+psycopg"))
+    found = examine(other, open_store(tmp_path / "again/files", other), lambda share, what: None)
+    assert found.faults == () and found.files == 6
+    refuses_changes(other)
+    other.close()
+
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(BackupError, match="pg_dump is not installed here"):
+        back_up(database, files, tmp_path / "none.tar", lambda share, what: None)
+    assert not (tmp_path / "none.tar").exists()
+    database.close()
+
+
+def test_one_server_works_on_a_database_whatever_its_state_folder(postgres_url: str, tmp_path: Path) -> None:
+    database, other = Database(postgres_url), Database(postgres_url)
+    database.migrate()
+    with database.kept_to_one_server():
+        refused = pytest.raises(DatabaseError, match="another Snap6D server works on this database")
+        with refused, other.kept_to_one_server():
+            pass
+        serve = ("serve", "--port", "0", "--workers", "1", "--database-url", postgres_url)
+        assert "another Snap6D server works on this database" in failure(run_snap6d(tmp_path, *serve))
+    with other.kept_to_one_server():
+        pass
+    database.close()
+    other.close()
+
+
+def test_a_database_of_a_newer_version_is_refused_with_a_sentence(postgres_url: str) -> None:
+    database = Database(postgres_url)
+    database.migrate()
+    with database.write() as session:
+        found = session.scalar(text("SELECT version_num FROM alembic_version"))
+        session.execute(text("UPDATE alembic_version SET version_num = 'later'"))
+    try:
+        for use in (database.check_version, database.migrate):
+            with pytest.raises(DatabaseError, match=r"newer Snap6D \(revision later\); update Snap6D"):
+                use()
+    finally:
+        with database.write() as session:
+            session.execute(text("UPDATE alembic_version SET version_num = :found"), {"found": found})
+        database.close()

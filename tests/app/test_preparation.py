@@ -108,3 +108,17 @@ def test_an_object_that_cannot_be_built_says_why_and_stops_no_other(services, pr
     assert not preparation.is_prepared(bad)
     assert preparation.problem(bad).startswith("thread cannot be snapped to: mesh is too thin")
     assert preparation.problem(others[0]) is None
+
+
+def test_an_object_whose_file_is_damaged_says_so_until_it_is_mended(services, preparation):
+    item = objects_of(services)[0]
+    path = services.files.path(item.mesh_hash)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-1])
+    preparation.start()
+    wait_until(lambda: preparation.problem(item), "the damage to be noticed")
+    assert f"the mesh of object {item.name!r} of dataset 'tools' is damaged" in preparation.problem(item)
+    services.files.put_bytes(whole)
+    preparation.look()
+    wait_until_prepared(services)
+    assert preparation.problem(item) is None

@@ -1,5 +1,7 @@
 """Pictures, depth, clouds and models out of the store."""
 
+import logging
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -51,6 +53,18 @@ def test_colour_is_handed_out_where_it_lies_on_the_depth(data, frames, files, tm
         assert data.aligned_color(frame) is None
     frame.color_hash = None
     assert data.aligned_color(frame) is None
+
+
+def test_a_colour_image_that_cannot_be_read_is_gone_without(data, frames, files, tmp_path, caplog):
+    damaged = tmp_path / "damaged.png"
+    damaged.write_bytes(files.read(frames[0].color_hash)[:200])
+    frames[0].color_hash = files.put_file(damaged)
+    with caplog.at_level(logging.WARNING):
+        assert data.aligned_color(frames[0]) is None
+        assert data.aligned_color(frames[0]) is None
+    (warning,) = caplog.messages  # one for however many snaps
+    assert "is used without its colours" in warning and "replace the file" in warning
+    assert data.depth(frames[0]).any()
 
 
 def test_the_camera_is_the_frames(frames):

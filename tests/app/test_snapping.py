@@ -3,21 +3,16 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError
 from contextlib import closing
 from pathlib import Path
-from threading import Event, current_thread
 
-import dask
 import numpy as np
 import pytest
-from distributed import Client, Scheduler, Worker
+from distributed import Nanny, Scheduler, Worker
 
-from app.snapping import DIED, UNREACHABLE, SnapError, Snapper
-from app.storage import PreparedStore
-from app.worker import JobResult, SnapJob
+from app.snapping import DIED, SnapError, Snapper
+from app.worker import JobResult
 from registration_core import ObjectModel, SnapConfig, region_of_interest
-from registration_core.algorithm import VIEWPOINT_ALGORITHM
 from tests.app.export.site import CAMERA
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import (
@@ -27,17 +22,18 @@ from tests.app.snap_jobs import (
     Outcome,
     assert_same,
     done_here,
+    knowing,
     new_job,
     new_model,
+    pids,
+    request,
+    result_of,
+    store_in,
     view_of,
 )
 from tests.app.waiting import LONGEST, wait_until
 
 SLOW = SnapConfig.from_dict(SLOW_SNAP)
-
-
-def store_in(folder: Path) -> PreparedStore:
-    return PreparedStore(folder, VIEWPOINT_ALGORITHM)
 
 
 @pytest.fixture(scope="module")
@@ -69,10 +65,6 @@ def idle_workers(snapper: Snapper) -> Iterator[None]:
         snapper._cancel(snap_id)
 
 
-def pids(snapper: Snapper) -> set[int]:
-    return set(snapper._client.result().run(os.getpid).values())
-
-
 def executing(snapper: Snapper) -> dict[str, int]:
     """How many tasks each worker is at."""
     return snapper._client.result().run(lambda dask_worker: len(dask_worker.state.executing))
@@ -81,17 +73,6 @@ def executing(snapper: Snapper) -> dict[str, int]:
 def busy(snapper: Snapper) -> int:
     """How many workers are at something."""
     return sum(executing(snapper).values())
-
-
-def knowing(snapper: Snapper, digest: str) -> int:
-    """How many workers know an object."""
-
-    def knows() -> bool:
-        from app import worker
-
-        return digest in worker._objects
-
-    return sum(snapper._client.result().run(knows).values())
 
 
 def addresses(snapper: Snapper) -> list[str]:
@@ -108,17 +89,6 @@ def forbid_building(snapper: Snapper) -> None:
         worker.build_viewpoint_model = None
 
     snapper._client.result().run(forbid)
-
-
-def request(snapper: Snapper, job: SnapJob, model: ObjectModel) -> tuple[Outcome, Callable[[], None]]:
-    outcome = Outcome()
-    return outcome, snapper.request(job, model, outcome.on_progress, outcome.on_end)
-
-
-def result_of(outcome: Outcome) -> JobResult | SnapError:
-    assert outcome.ended.wait(LONGEST)
-    (end,) = outcome.ends
-    return end
 
 
 def test_it_finds_what_the_library_finds_on_the_whole_image(snapper, model):
@@ -305,76 +275,15 @@ def test_what_was_built_is_never_built_again(tmp_path):
         assert isinstance(result_of(outcome), SnapError)  # so building was forbidden indeed
 
 
-def test_workers_of_a_cluster_get_what_one_of_them_built(cluster, tmp_path):
-    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
-        model, other = new_model(), new_model()
-        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
-        assert knowing(elsewhere, model.content_hash) in (1, 2)
-        elsewhere.hand_over([model.content_hash, other.content_hash])
-        assert knowing(elsewhere, model.content_hash) == 2 and knowing(elsewhere, other.content_hash) == 0
-        elsewhere.prepare(other)
-        wait_until(lambda: knowing(elsewhere, other.content_hash) == 2, "the workers to be prepared")
+def test_idle_processes_rest(snapper):
+    def pauses(dask_worker: Worker | Nanny) -> dict[str, float]:
+        """Milliseconds between the calls of whatever recurs."""
+        return {name: call.callback_time for name, call in dask_worker.periodic_callbacks.items()}
 
-
-def test_workers_of_a_cluster_do_not_go_on_for_who_has_closed(cluster, model, tmp_path):
-    def at_work(dask_worker: Worker) -> int:
-        return len(dask_worker.active_threads)
-
-    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
-        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic, SLOW), model)
-        assert outcome.moved.wait(LONGEST)
-    with Client(cluster, set_as_default=False) as onlooker:
-        wait_until(lambda: sum(onlooker.run(at_work).values()) == 0, "the worker to stop", seconds=5.0)
-
-
-def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
-    """Dask's one is every client's, and who waits there while his own closes may wait for ever."""
-    waited_in: list[str] = []
-
-    def noted(function: Callable[..., None]) -> Callable[..., None]:
-        def note(*args: object) -> None:
-            waited_in.append(current_thread().name.rstrip("_0123456789"))
-            function(*args)
-
-        return note
-
-    with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
-        elsewhere._on_done = noted(elsewhere._on_done)
-        elsewhere._objects._on_built = noted(elsewhere._objects._on_built)
-        model = new_model()
-        outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
-    assert waited_in == ["results"] * 3  # the object was not known, is built, and the snap is done
-
-
-def test_what_ends_after_closing_is_not_waited_for(cluster, tmp_path):
-    held, free, told = Event(), Event(), Event()
-
-    def hold(_: object) -> None:
-        held.set()
-        free.wait(LONGEST)
-
-    with Client(cluster, set_as_default=False) as other:
-        other.submit(int, pure=False).add_done_callback(hold)  # in the thread that all clients share
-        assert held.wait(LONGEST)
-        with closing(Snapper(cluster, 1, store_in(tmp_path))) as closed:
-            promise = closed.built(new_model())
-        with pytest.raises(CancelledError):
-            promise.result(LONGEST)
-        free.set()
-        other.submit(int, pure=False).add_done_callback(lambda _: told.set())
-        assert told.wait(LONGEST)
-
-
-def test_without_a_scheduler_a_snap_says_so(model, tmp_path):
-    with dask.config.set({"distributed.comm.timeouts.connect": "0.5s"}):
-        alone = Snapper("tcp://127.0.0.1:1", 1, store_in(tmp_path))
-        with pytest.raises(OSError, match="Timed out"):
-            alone.wait_until_ready()
-    assert alone.worker_count() == 0
-    outcome, cancel = request(alone, new_job(model), model)
-    end = result_of(outcome)
-    assert isinstance(end, SnapError) and str(end) == UNREACHABLE
-    cancel()
-    alone.close()
+    client = snapper._client.result()
+    workers, nannies = client.run(pauses), client.run(pauses, nanny=True)
+    recurring = [*workers.values(), *nannies.values()]
+    assert len(recurring) == 4
+    for found in recurring:
+        assert "profile" not in found
+        assert found["tick"] >= 1000.0 and found["monitor"] >= 1000.0

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from app.storage import FileStore, PreparedStore
+from app.storage import DamagedFileError, FileStore, PreparedStore
 
 
 def stored(files: FileStore) -> list[Path]:
@@ -57,6 +57,36 @@ def test_a_write_that_fails_leaves_nothing(files, monkeypatch):
     assert stored(files) == []
     monkeypatch.undo()
     assert files.read(files.put_bytes(b"content")) == b"content"
+
+
+def flip_a_bit(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def cut_short(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-1])
+
+
+@pytest.mark.parametrize(
+    ("damage", "fault"),
+    [
+        (flip_a_bit, "is damaged on the disk"),
+        (cut_short, "is damaged on the disk"),
+        (Path.unlink, "is missing on the disk"),
+    ],
+)
+def test_a_file_that_is_not_what_its_hash_says_is_not_handed_out_and_is_put_back(files, damage, fault):
+    digest = files.put_bytes(b"content")
+    damage(files.path(digest))
+    for reader in (files.path, files.read):
+        with pytest.raises(DamagedFileError) as raised:
+            reader(digest)
+        assert str(raised.value) == (f"a stored file {fault} (file {digest[:12]}); import its dataset again")
+    assert files.put_bytes(b"content") == digest
+    assert files.read(digest) == b"content"
+    assert files.path(digest).read_bytes() == b"content" and len(stored(files)) == 1
 
 
 def test_many_at_once_put_the_same_content(files):

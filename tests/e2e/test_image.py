@@ -297,3 +297,23 @@ def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser
         take_picture(page, "label-without-webgl")
     finally:
         context.close()
+
+
+def test_the_image_changes_places_with_the_view(image: Image) -> None:
+    page, frame = image.page, image.desk.frame
+
+    def times_as_wide_as_the_view() -> float:
+        image_box, view_box = (page.locator(part).bounding_box() for part in ("#image", "#view"))
+        assert image_box is not None and view_box is not None
+        return image_box["width"] / view_box["width"]
+
+    before = times_as_wide_as_the_view()
+    assert before < 0.5
+    frame.evaluate("() => { window.isTheSame = true; }")
+    page.keyboard.press("Shift+Z")
+    assert times_as_wide_as_the_view() > 2
+    wait_for_picture(frame)
+    take_picture(page, "image-large")
+    page.locator("#swap").click()
+    assert times_as_wide_as_the_view() == before
+    assert frame.evaluate("() => window.isTheSame")  # it was not loaded anew

@@ -96,12 +96,33 @@ class Desk:
         seen = [(event["kind"], event["detail"]) for event in items]
         raise AssertionError(f"{kind} came {len(found)} times; there is {seen}")
 
+    def submit_unsure(self) -> None:
+        """Submit a pose that the page asks about, once it knows how little agrees."""
+        expect(self.page.locator("#agreement-share")).to_have_text(re.compile(r"^([1-4]?\d %|–)"))
+        self.page.keyboard.press("Enter")
+        expect(self.page.locator("#unsure")).to_be_visible()
+        self.page.keyboard.press("Enter")
+        self.events("submit")
+
+    def submit(self) -> None:
+        """Submit whatever the pose is, and say so again where the page asks."""
+        asked, submitted = self.page.locator("#unsure-submit"), self.page.locator("#replay")
+        self.page.locator("#submit").click()
+        expect(asked.or_(submitted).filter(visible=True)).to_have_count(1)
+        if asked.is_visible():
+            asked.click()
+        expect(submitted).to_be_visible()
+
+    def wait_for(self, is_so: Callable[[dict], bool]) -> None:
+        """Return when something is so of the registration's state on the server."""
+        deadline = time.monotonic() + 90
+        while not is_so(self.state):
+            assert time.monotonic() < deadline, self.state
+            self.page.wait_for_timeout(50)
+
     def wait_for_progress(self) -> None:
         """Return when a snap is under way in a worker."""
-        deadline = time.monotonic() + 90
-        while not (self.state["snap"] or {"progress": 0})["progress"] > 0:
-            assert time.monotonic() < deadline
-            self.page.wait_for_timeout(50)
+        self.wait_for(lambda state: (state["snap"] or {"progress": 0})["progress"] > 0)
 
     def wait_until_shown(self) -> None:
         """Return when the 3-D view has the object where it is."""

@@ -26,6 +26,18 @@ DARK_PIXELS = """canvas => {
   return data.filter((_, i) => i % 4 === 3 && data[i] > 0).length;
 }"""
 
+YELLOW_AND_RED = """() => {
+  const canvas = document.querySelector("#mesh");
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  let yellow = 0, red = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    if (data[i] < 100 || data[i + 2] > data[i] / 2) continue;
+    if (data[i + 1] > data[i] / 2) yellow += 1;
+    else red += 1;
+  }
+  return yellow > 10_000 && red > 1_000;
+}"""
+
 
 @pytest.fixture
 def dataset(server: Server, tmp_path: Path, request: pytest.FixtureRequest) -> str:
@@ -58,6 +70,16 @@ class ObjectPage:
     def drawn(self, canvas: str) -> int:
         """How many pixels a canvas shows."""
         return self.page.locator(canvas).evaluate(DARK_PIXELS)
+
+
+def test_an_object_is_shown_in_its_own_colours(server: Server, open_page: Callable[[str], Page]) -> None:
+    page = open_page(server.new_link("looks at colours", "admin"))
+    page.wait_for_url(f"{server.url}/")
+    objects = page.request.get(f"{server.url}/api/objects?dataset_id=1").json()["items"]
+    box = next(one["id"] for one in objects if one["name"] == "box")  # yellow, with red stripes
+    page.goto(f"{server.url}/objects/{box}")
+    page.wait_for_function(YELLOW_AND_RED)
+    take_picture(page, "object-in-its-colours")
 
 
 def test_a_lead_plays_accepts_changes_and_takes_back(

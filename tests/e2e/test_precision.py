@@ -27,6 +27,15 @@ CAMERA = """() => {
   return camera.matrixWorld.elements;
 }"""
 
+COVERED = """() => [...document.querySelectorAll(".stage button, .strip > button, .strip > span button")]
+  .filter(node => node.checkVisibility())
+  .filter(node => {
+    const { left, top, width, height } = node.getBoundingClientRect();
+    return !node.contains(document.elementFromPoint(left + width / 2, top + height / 2));
+  })
+  .map(node => node.id || node.textContent)"""
+"""Controls over and below the view that something else lies on."""
+
 
 class PreciseDesk(Desk):
     """A labelling page, with what is needed to say where things are."""
@@ -317,3 +326,11 @@ def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: Prec
     assert np.abs(pixel(page, desk.frame, np.zeros(3)) - where).max() < 60
     page.keyboard.press("?")
     take_picture(page, "label-keys-precision")
+
+
+def test_the_settings_cover_no_control(desk: PreciseDesk) -> None:
+    desk.page.locator("#precision summary").click()
+    desk.page.keyboard.press("f")  # with candidates, which lie over the view as well
+    expect(desk.page.locator("#candidates")).to_be_visible(timeout=60_000)
+    take_picture(desk.page, "label-precision-open")
+    assert desk.page.evaluate(COVERED) == []

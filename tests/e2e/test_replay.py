@@ -31,8 +31,7 @@ def desk(server: Server, open_page: Callable[[str], Page]) -> Desk:
     page.keyboard.press("Control+z")
     desk.events("undo")
     expect(page.locator("#submit")).to_be_enabled()  # the page has heard that the snap has ended
-    page.keyboard.press("Enter")
-    desk.events("submit")
+    desk.submit_unsure()
     return desk
 
 

@@ -11,12 +11,32 @@ from app.database import Database
 from tests.app.analysis.hand_made import Entry, at, moved, view
 from tests.app.analysis.hand_made_study import HandMadeStudy, ordinary_work, snapped
 from tests.e2e.conftest import take_picture
+from tests.e2e.test_set_up import BROKEN_WORDS
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
 NEARER = (0.07, 0.045, 0.03, 0.02, 0.012, 0.006)
 """Metres from the world's origin that each move comes to; the turn shrinks along."""
+
+PANELS = """() => {
+  const root = document.documentElement;
+  const panels = [...document.querySelectorAll(".chart")];
+  const boxes = panels.map(panel => panel.getBoundingClientRect());
+  const isCut = (text, panel) => {
+    const [inner, outer] = [text, panel].map(node => node.getBoundingClientRect());
+    return inner.left < outer.left || inner.right > outer.right || inner.bottom > outer.bottom;
+  };
+  return {
+    wider: root.scrollWidth > root.clientWidth,
+    lefts: boxes.map(({ left }) => Math.round(left)),
+    tops: boxes.map(({ top }) => Math.round(top)),
+    widths: boxes.map(({ width }) => Math.round(width)),
+    cut: panels.flatMap(panel => {
+      return [...panel.querySelectorAll("svg text, h2")].filter(text => isCut(text, panel));
+    }).map(text => text.textContent),
+  };
+}"""
 
 
 def log_of(seconds_a_move: float, end: float) -> list[Entry]:
@@ -107,6 +127,36 @@ def test_curves_are_chosen_read_and_lead_to_the_replay(page: Page) -> None:
     page.keyboard.press("Enter")
     page.wait_for_url("**/replay/*")
     expect(page.locator("#events")).to_contain_text("Submitted")
+
+
+def test_groups_and_errors_stand_two_by_two_on_one_scale_each(page: Page) -> None:
+    for width, columns in ((1366, 2), (1920, 2), (390, 1)):
+        page.set_viewport_size({"width": width, "height": 768})
+        found = page.evaluate(PANELS)
+        assert found["wider"] is False and found["cut"] == [], width
+        assert len(set(found["lefts"])) == columns and len(set(found["widths"])) == 1, width
+        tops = found["tops"]
+        assert tops == sorted(tops) and len(set(tops)) == 4 // columns, width
+    novice, _, expert, _ = page.locator(".chart").all()
+    ticks = [panel.locator(".tick").all_text_contents() for panel in (novice, expert)]
+    assert ticks[0] == ticks[1]  # though novices take twice as long
+    page.set_viewport_size({"width": 1366, "height": 768})
+    page.locator("#panels").evaluate("node => node.scrollIntoView()")
+    take_picture(page, "report-two-by-two")
+
+
+def test_a_fit_and_a_point_that_tell_little_say_so_beside_their_numbers(page: Page) -> None:
+    for title, words in (
+        ("Fitts' law", "This fit tells little: 5 trials of 5 operators"),
+        ("Hand-off", "This point tells little: "),
+    ):
+        part = page.locator("#sections section").filter(has=page.get_by_role("heading", name=title))
+        expect(part.locator(".caution").first).to_contain_text(words)
+        part.evaluate("node => node.scrollIntoView()")
+        for width in (390, 1366):
+            page.set_viewport_size({"width": width, "height": 768})
+            assert page.evaluate(BROKEN_WORDS) == []
+            take_picture(page, f"report-caution-{title[:5].lower()}-{width}")
 
 
 def test_the_numbers_are_there_as_a_table_and_as_files(page: Page) -> None:

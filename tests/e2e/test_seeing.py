@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.labeling.view import COARSE_POINTS
+from app.labeling.cloud_view import COARSE_POINTS
 from registration_core import pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import DRAWN_FINELY, take_picture
@@ -141,21 +141,46 @@ def test_software_draws_few_points_unless_all_are_asked_for(
     frame.wait_for_function(POINTS_DRAWN, arg=[1, COARSE_POINTS])
 
 
+HIDDEN = {"cloud": False, "mesh": False, "texture": True, "fine": True, "agreement": False}
+
+
+def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: Image) -> None:
+    desk, page = image.desk, image.page
+    texture = page.get_by_role("button", name="Texture")
+    expect(texture).to_have_attribute("aria-pressed", "true")
+    desk.frame.wait_for_function(IS_DRAWN, arg="/object/textured")
+    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/mesh")
+    wait_for_picture(desk.frame)
+    take_picture(page, "label-texture")
+    page.keyboard.press("Shift+M")
+    expect(texture).to_have_attribute("aria-pressed", "false")
+    desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh")
+    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
+    page.reload()
+    frame = desk.frame = view_frame(page)
+    expect(texture).to_have_attribute("aria-pressed", "false")  # as the browser remembers
+    frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
+    texture.click()
+    frame.wait_for_function(IS_DRAWN, arg="/object/textured")
+    page.keyboard.press("r")  # how depth agrees lies on the plain mesh
+    frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
+    frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
+    page.keyboard.press("r")
+    frame.wait_for_function(IS_DRAWN, arg="/object/textured")
+
+
 def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
     desk, page = image.desk, image.page
     assert page.request.post(f"{desk.url}/reset").ok
     page.keyboard.press("b")
     desk.frame.wait_for_function(IS_HIDDEN, arg="/cloud")
     page.get_by_role("button", name="Mesh").click()
-    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/mesh")
+    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
     expect(page.get_by_role("button", name="Cloud")).to_have_attribute("aria-pressed", "false")
     assert desk.drag("tz", 0.05)["dof"] == ["tz"]  # the gizmo stays
     take_picture(page, "label-layers-hidden")
     assert page.request.put(f"{desk.url}/layers", data={}).ok  # as after the server was restarted
-    wait_until(
-        lambda: desk.state["layers"] == {"cloud": False, "mesh": False, "fine": True, "agreement": False},
-        "what was chosen",
-    )
+    wait_until(lambda: desk.state["layers"] == HIDDEN, "what was chosen")
     page.keyboard.press("m")
-    page.keyboard.press("b")
-    wait_until(lambda: desk.state["layers"]["mesh"], "the mesh")
+    page.keyboard.press("b")  # at once: neither is lost
+    wait_until(lambda: desk.state["layers"] == {**HIDDEN, "cloud": True, "mesh": True}, "both")

@@ -45,7 +45,7 @@ def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk
     page.reload()
     expect(only).to_have_attribute("aria-pressed", "true")  # as the browser remembers
 
-    page.locator("#submit").click()
+    desk.submit()
     page.locator("#replay").click()
     applied = page.locator("#events li").filter(has_text="Snap applied")
     expect(applied.nth(0)).to_contain_text("2 frames, 1 of 1 other agrees")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from secrets import token_hex
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -22,7 +23,7 @@ def participant_link(admin: Page, server: Server) -> str:
     thing = {"scene_id": task["scene"]["id"], "object_id": task["object"]["id"]}
     plan = {"tasks": [thing], "modes": ["quick"], "groups": {"novice": 1}}
     studies = f"{server.url}/api/studies"
-    study = admin.request.post(studies, data={"name": "Trouble", "plan": plan}).json()
+    study = admin.request.post(studies, data={"name": f"Trouble {token_hex(3)}", "plan": plan}).json()
     invited = admin.request.post(f"{studies}/{study['id']}/participants", data={"group": "novice"})
     return str(invited.json()["link"])
 
@@ -64,6 +65,7 @@ def test_a_participant_goes_on_after_another_window_a_lost_login_and_a_killed_se
         expect(other.locator("#closed")).to_contain_text("opened in another tab", timeout=SLOWEST)
         other.close()
         view_frame(page)
+        expect(page.locator("#undo")).to_be_enabled(timeout=SLOWEST)
 
         end_login(page, server)
         page.locator("#undo").click()

@@ -5,6 +5,7 @@ import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -47,7 +48,7 @@ def test_mug_of_frame_0(server: Server, ycbv: Path, open_page: Callable[[str], P
     # The start is such that the drag along the gizmo's x axis ends 2 cm and 15 degrees off.
     target = pose.perturbed(official, 0.02, np.radians(15), np.random.default_rng(5))
     start = target @ pose.exp([-DRAGGED, 0, 0, 0, 0, 0])
-    task_id = page.url.rsplit("/", 1)[1]
+    task_id = urlsplit(page.url).path.rsplit("/", 1)[1]
     registration = page.request.post(f"{server.url}/api/tasks/{task_id}/registration").json()
     url = f"{server.url}/api/registrations/{registration['id']}"
     assert page.request.put(f"{url}/pose", data={"T_world_object": start.tolist()}).ok

@@ -61,8 +61,8 @@ def test_what_was_written_is_read_back(dataset):
     assert first.ground_truth[0].obj_id == 7
     assert first.ground_truth[0].T_camera_object == pytest.approx(T_CAMERA_OBJECT)
     assert second.ground_truth is None
-    assert read_depth(first.depth_path, first.depth_scale) == pytest.approx(0.6)
-    assert read_color(first.color_path)[0, 0].tolist() == [10, 20, 30]
+    assert read_depth(first.depth.path, first.depth_scale) == pytest.approx(0.6)
+    assert read_color(first.color.path)[0, 0].tolist() == [10, 20, 30]
 
 
 def test_camera_poses_are_written_as_world_to_camera_in_millimetres():
@@ -111,7 +111,7 @@ def test_what_is_optional_may_be_missing(dataset):
     assert read.objects[0].name == "object 7"
     assert read.objects[0].model.symmetries == Symmetries()
     image = read.scenes[0].images[0]
-    assert (image.color_path, image.T_world_camera, image.ground_truth) == (None, None, None)
+    assert (image.color, image.T_world_camera, image.ground_truth) == (None, None, None)
 
 
 def test_grey_jpeg_pictures_are_found(dataset):
@@ -119,8 +119,8 @@ def test_grey_jpeg_pictures_are_found(dataset):
     (dataset / SCENE / "gray").mkdir()
     Image.new("L", (32, 24), 77).save(dataset / SCENE / "gray/000003.jpg")
     image = read_dataset(dataset).scenes[0].images[0]
-    assert image.color_path.name == "000003.jpg"
-    assert read_color(image.color_path).shape == (24, 32, 3)
+    assert image.color.path.name == "000003.jpg"
+    assert read_color(image.color.path).shape == (24, 32, 3)
 
 
 def test_every_split_with_numbered_folders_is_read(dataset):
@@ -348,7 +348,7 @@ def test_official_poses_fit_the_real_depth(shared_data):
     read = read_dataset(shared_data / "ycbv")
     models = {known.obj_id: known.model for known in read.objects}
     image = read.scenes[0].images[0]
-    observed = read_depth(image.depth_path, image.depth_scale)
+    observed = read_depth(image.depth.path, image.depth_scale)
     for truth in image.ground_truth:
         rendered = render_depth(models[truth.obj_id], image.camera, truth.T_camera_object)
         shown = (rendered > 0) & (observed > 0) & (np.abs(rendered - observed) < 0.02)

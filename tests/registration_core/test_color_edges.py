@@ -91,7 +91,10 @@ def test_without_steps_nothing_is_found() -> None:
 
 def test_no_image_of_bytes_is_refused() -> None:
     good = np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8)
-    assert checked_color(good, CAMERA) is good
+    size, depth = good.shape[:2], np.ones(good.shape[:2], np.float32)
+    assert checked_color(good, size) is good
     for bad in (good.astype(float), good[..., 0], good[:-1], good.tolist()):
         with pytest.raises(ValueError, match="color must be bytes"):
-            checked_color(bad, CAMERA)
+            checked_color(bad, size)
+        with pytest.raises(ValueError, match="color must be bytes"):
+            color_is_aligned(bad, depth)

@@ -73,23 +73,25 @@ def shares(match: float, seen_through: float) -> np.ndarray:
 
 
 def test_features_are_what_they_are_called() -> None:
-    spoken = features(np.array([0.25]), np.array([3.0]), shares(0.75, 0.25)[None])[0]
+    spoken = features(np.array([0.25]), np.array([3.0]), shares(0.75, 0.25)[None], np.array([0.005]))[0]
     found = dict(zip(FEATURES, spoken, strict=True))
     assert found["belief"] == pytest.approx(np.log(1 / 3))
     assert found["score"] == 3.0
     assert found["inner match"] == pytest.approx(0.75)
     assert found["shown"] == 1.0
+    assert found["precision"] == pytest.approx(np.log(10.0))
 
 
-def test_confidence_rises_with_belief_score_and_match() -> None:
+def test_confidence_rises_with_belief_score_match_and_precision() -> None:
     good, poor = shares(0.9, 0.0), shares(0.3, 0.6)
-    sure = confidence(0.9, 8.0, good, CONFIG)
-    assert sure > confidence(0.3, 8.0, good, CONFIG)
-    assert sure > confidence(0.9, 0.0, good, CONFIG)
-    assert sure > confidence(0.9, 8.0, poor, CONFIG)
-    assert confidence(0.2, -8.0, poor, CONFIG) < 0.2
+    sure = confidence(0.9, 8.0, good, 0.02, CONFIG)
+    assert sure > confidence(0.3, 8.0, good, 0.02, CONFIG)
+    assert sure > confidence(0.9, 0.0, good, 0.02, CONFIG)
+    assert sure > confidence(0.9, 8.0, poor, 0.02, CONFIG)
+    assert sure > confidence(0.9, 8.0, good, 0.04, CONFIG)
+    assert confidence(0.2, -8.0, poor, 0.1, CONFIG) < 0.2
 
 
 @pytest.mark.parametrize("belief", [0.0, 0.5, 1.0])
 def test_confidence_of_no_pixels_at_all_is_a_probability(belief) -> None:
-    assert 0.0 <= confidence(belief, 0.0, np.zeros(COUNT), CONFIG) <= 1.0
+    assert 0.0 <= confidence(belief, 0.0, np.zeros(COUNT), 0.7, CONFIG) <= 1.0

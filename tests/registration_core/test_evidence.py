@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from registration_core import Intrinsics, SnapConfig, pose
+from registration_core.color_edges import BORDER
 from registration_core.evidence import (
     BELOW,
     COLOR_CHANGES,
@@ -185,6 +186,17 @@ def test_colours_are_looked_at_along_the_visible_outline_only(scene, block) -> N
     assert sum(colored(hidden, steady)) < 0.1 * edges
     known = model, grid._replace(known=np.ones_like(grid.known)), truth
     assert colored(known, steady) == (0.0, 0.0)
+
+
+def test_edges_too_near_to_the_border_of_the_image_to_be_looked_up_are_not_counted(scene) -> None:
+    """The object is half out of the picture: what is its outline there is where the picture ends."""
+    model, grid, truth = scene
+    cut = grid._replace(cx=f4(1.5))
+    height, width = grid.depth.shape
+    changing = np.zeros((height - 2, width - 2), np.bool_)
+    changing[BORDER:-BORDER, BORDER:-BORDER] = True
+    steady, changes = colored((model, cut, truth), changing)
+    assert steady == 0.0 < changes
 
 
 def test_without_a_colour_image_nothing_is_counted(scene) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from registration_core import Intrinsics, SnapConfig, pose
 from registration_core.camera import depth_to_points
+from registration_core.color_edges import color_changes
 from registration_core.observation import is_held_out, observe, reduction, window
 from registration_core.rasterizer import render_depth
 from registration_core.viewpoint_model import viewpoint_model
@@ -51,6 +52,22 @@ def test_flat_side_of_a_masked_object_is_no_table() -> None:
     alone = render_depth(scene.model, scene.camera, scene.truth)
     centre = pose.apply(scene.truth, scene.model.centre)
     assert (look(alone, scene.camera, centre).grid.weight == 1.0).all()
+
+
+@pytest.mark.parametrize("block", [1, 2, 4])
+def test_colours_are_read_unreduced_where_the_depth_is(block) -> None:
+    size, focal = 60 * block, 200.0 * block
+    camera = Intrinsics(size, size + 8, focal, focal, size / 2, size / 2)
+    depth = np.full((camera.height, camera.width), 0.8, np.float32)
+    color = np.random.default_rng(0).integers(0, 256, (*depth.shape, 3)).astype(np.uint8)
+    model, near = viewpoint_model(tool()), np.array([0.05, -0.03, 0.8])
+    observed = observe(depth, camera, near, model, CONFIG, np.random.default_rng(0), None, color)
+    rows, columns = (block * (side - 2) for side in observed.grid.depth.shape)
+    left, top, _, _ = window(camera, near, model.radius, CONFIG.reach)
+    seen = color[top : top + rows, left : left + columns]
+    assert observed.block == block
+    np.testing.assert_array_equal(observed.grid.changes, color_changes(seen))
+    assert look(depth, camera, near).grid.changes.size == 0
 
 
 def test_border_is_never_measured() -> None:

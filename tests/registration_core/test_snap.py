@@ -83,6 +83,17 @@ def test_estimate_is_a_consistent_record(scene) -> None:
 
 
 @pytest.mark.parametrize("config", [SnapConfig(), SHORT_FILTER])
+def test_colours_that_end_with_the_object_speak_for_it(scene, config) -> None:
+    shape = render_depth(scene.model, scene.camera, scene.truth) > 0
+    fitting = np.where(shape[..., None], (200, 60, 40), (60, 70, 80)).astype(np.uint8)
+    plain = np.full_like(fitting, 90)
+    start = started(scene, 0.02, 15, 0)
+    without, with_it, against = (run(scene, start, config, color=one) for one in (None, fitting, plain))
+    assert len({one.confidence for one in (without, with_it, against)}) == 3
+    assert with_it.confidence > against.confidence
+
+
+@pytest.mark.parametrize("config", [SnapConfig(), SHORT_FILTER])
 def test_same_seed_same_estimate_bit_for_bit(scene, config) -> None:
     start = started(scene, 0.03, 20, 1)
     first, again = run(scene, start, config, 5), run(scene, start, config, 5)

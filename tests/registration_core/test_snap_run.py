@@ -50,6 +50,15 @@ def test_what_holds_a_pose_is_told_in_the_first_cameras_axes() -> None:
     np.testing.assert_allclose(there.systems(poses, 0.006)[0], turn.T @ hessian @ turn, rtol=2e-3, atol=1e-2)
 
 
+def test_how_firmly_a_pose_is_held_does_not_depend_on_whose_axes_it_is_in() -> None:
+    here, there = sighting(), sighting(pose.exp([0.1, -0.2, 0.3, 0.4, 0.5, -0.6]))
+    seen = run_of(here).polished_start()
+    spreads = run_of(here).spreads(seen)
+    np.testing.assert_allclose(run_of(there).spreads(there.found(seen)), spreads, rtol=5e-3)
+    np.testing.assert_allclose(run_of(here, here).spreads(seen), spreads / np.sqrt(2.0), rtol=5e-3)
+    assert 0.001 < spreads[0] < 0.1
+
+
 def test_the_proposals_of_a_round_are_shared_out_among_the_views() -> None:
     one, two = run_of(sighting()), run_of(sighting(), sighting())
     alone, shared = list(one.round(0.5, 1.0)), list(two.round(0.5, 1.0))

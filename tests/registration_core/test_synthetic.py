@@ -40,7 +40,7 @@ def test_the_written_dataset_is_a_bop_dataset(written):
         assert len(known.model.symmetry_transforms) == len(source.model.symmetry_transforms)
     (scene,) = dataset.scenes
     assert len(scene.images) == 3
-    assert all(image.color_path is not None and len(image.ground_truth) == 5 for image in scene.images)
+    assert all(image.color is not None and len(image.ground_truth) == 5 for image in scene.images)
 
 
 def test_true_poses_agree_between_views_and_with_depth(written):
@@ -52,7 +52,7 @@ def test_true_poses_agree_between_views_and_with_depth(written):
         assert in_world[2] == pytest.approx(in_world[0], abs=1e-9)
         errors = []
         for image in images:
-            depth = read_depth(image.depth_path, image.depth_scale)
+            depth = read_depth(image.depth.path, image.depth_scale)
             rendered = render_depth(known.model, image.camera, image.ground_truth[index].T_camera_object)
             seen = (rendered > 0) & (depth > 0) & (rendered < depth + 0.02)
             errors.append((depth - rendered)[seen])
@@ -62,7 +62,7 @@ def test_true_poses_agree_between_views_and_with_depth(written):
 def test_pictures_show_the_objects_where_they_are(written):
     dataset = read_dataset(written)
     for image in dataset.scenes[0].images:
-        picture = read_color(image.color_path).astype(int)
+        picture = read_color(image.color.path).astype(int)
         T_camera_bowl = image.ground_truth[3].T_camera_object
         blue = (picture[..., 2] > picture[..., 0] + 40) & (picture[..., 2] > picture[..., 1] + 30)
         silhouette = render_depth(dataset.objects[3].model, image.camera, T_camera_bowl) > 0
@@ -95,7 +95,7 @@ def test_every_bundled_object_shows_well_in_some_view():
 
 def visible_shares(objects, image) -> list[float]:
     """Visible share of each object by the measured depth, counted as an exported dataset counts it."""
-    depth = read_depth(image.depth_path, image.depth_scale)
+    depth = read_depth(image.depth.path, image.depth_scale)
     depth[depth == 0] = np.inf
     shares = []
     for known, truth in zip(objects, image.ground_truth, strict=True):

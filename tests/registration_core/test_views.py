@@ -7,6 +7,7 @@ import pytest
 
 from registration_core import SnapConfig, pose, snap, snap_views, snap_views_steps
 from registration_core.estimate import WorldEstimate
+from registration_core.kernels import centred
 from registration_core.rasterizer import render_depth
 from tests.registration_core.simple_scene import CAMERA, block, model_of, nearest, noisy, tool
 
@@ -50,6 +51,37 @@ def test_recovers_the_pose_from_far_off(views, seed) -> None:
     assert estimate.converged
     np.testing.assert_array_equal(estimate.T_camera_object, estimate.T_world_object)
     np.testing.assert_array_equal(estimate.hypotheses[0].T_camera_object, estimate.T_world_object)
+
+
+def test_one_view_gives_what_snap_gives_to_the_last_bit() -> None:
+    """Whatever the start: making a pose rigid twice may move it by one last digit, and the scores with it."""
+    depth, camera, T_world_camera = view(0.0)
+    T_camera_object, rng = pose.inverse(T_world_camera) @ T_WORLD_OBJECT, np.random.default_rng(0)
+    starts = (pose.perturbed(T_camera_object, 0.05, 1.0, rng) for _ in range(99))
+    start = next(T for T in starts if moves_when_made_rigid_twice(T))
+    half = np.where(np.arange(depth.shape[1]) < depth.shape[1] // 2, depth, 0.0)  # leaves many hypotheses
+    here = snap(tool(), half, camera, start, rng=np.random.default_rng(0))
+    there = run([(half, camera, np.eye(4))], start)
+    np.testing.assert_array_equal(there.T_camera_object, here.T_camera_object)
+    assert [one.weight for one in there.hypotheses] == [one.weight for one in here.hypotheses]
+    assert len(here.hypotheses) > 1
+    assert there.confidence == here.confidence
+
+
+def moves_when_made_rigid_twice(T: np.ndarray) -> bool:
+    once = pose.checked(T, "once")
+    depths = [centred(rigid, tool().centre)[2, 3] for rigid in (once, pose.checked(once, "twice"))]
+    return depths[0] != depths[1]
+
+
+def test_each_view_is_seen_in_its_own_colours(views) -> None:
+    start = pose.perturbed(T_WORLD_OBJECT, 0.02, 0.3, np.random.default_rng(0))
+    shapes = [render_depth(tool(), CAMERA, pose.inverse(T) @ T_WORLD_OBJECT) > 0 for _, _, T in views[:2]]
+    colors = [np.where(shape[..., None], (200, 60, 40), (60, 70, 80)).astype(np.uint8) for shape in shapes]
+    ways = (colors, [colors[0], None], [None, colors[1]], colors[::-1], None)
+    sure = [run(views[:2], start, colors=way).confidence for way in ways]
+    assert len(set(sure)) == len(ways)
+    assert sure[0] == max(sure)
 
 
 def test_more_views_leave_less_doubt(views) -> None:

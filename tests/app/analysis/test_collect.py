@@ -45,7 +45,9 @@ def test_errors_are_those_from_the_mean_of_the_accurate_registrations_by_hand(da
     assert quick.errors.translation[-1] == pytest.approx(0.01)
     assert (quick.operator, quick.group, quick.mode, quick.condition) == ("P2", "novice", "quick", "manual")
     assert collected.groups == {"novice": 2} and not collected.is_simulated
-    assert "offline snaps: none were computed" in said(collected)
+    assert "none were computed; there are no STG curves until `snap6d study snap` computes them" in said(
+        collected
+    )
 
     (cell, *_) = cells_of(collected.trials[:2], Timing(), seed=0)
     half = np.abs(MARGINS["translation"] - 0.0501).argmin()

@@ -8,18 +8,48 @@ import httpx
 import pytest
 
 from app.auth import Role
+from app.database import Database
+from app.importing import import_dataset
 from app.main import create_services
+from app.storage import FileStore
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
+from tests.app.postgres import new_database
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run all tests of the interface on both databases."""
+    if "server" in metafunc.fixturenames:
+        metafunc.parametrize("server", ["sqlite", "postgresql"], indirect=True, scope="module")
+
+
+@pytest.fixture(scope="session")
+def imported_on_postgres(postgres_server: str, demo: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Name of a database into which the small dataset was imported; to be copied."""
+    url = new_database(postgres_server)
+    database = Database(url)
+    database.migrate()
+    import_dataset(database, FileStore(tmp_path_factory.mktemp("imported") / "files"), demo)
+    database.close()
+    return url.rpartition("/")[2]
 
 
 @pytest.fixture(scope="module")
 def server(
-    imported_state: Path, cluster: str, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest,
+    imported_state: Path,
+    cluster: str,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Iterator[LiveServer]:
-    """The application behind a real port, for the tests of one file."""
+    """The application behind a real port, for the tests of one file, on one of the databases."""
     state_dir = Path(shutil.copytree(imported_state, tmp_path_factory.mktemp("server") / "state"))
-    with running_server(create_services(settings_for(state_dir, cluster))) as running:
+    settings = settings_for(state_dir, cluster)
+    if request.param == "postgresql":
+        place, template = (
+            request.getfixturevalue(name) for name in ("postgres_server", "imported_on_postgres")
+        )
+        settings = settings.model_copy(update={"database_url": new_database(place, template)})
+    with running_server(create_services(settings)) as running:
         yield running
 
 

@@ -11,6 +11,7 @@ import pytest
 import trimesh
 from sqlalchemy import text
 
+from app.auth import Role
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 from tests.app.small_dataset import POSED_SCENE, UNPOSED_SCENE, change_json
@@ -268,3 +269,34 @@ def test_two_uploads_at_once_make_one_dataset(server: LiveServer, chief: httpx.C
         thread.join(LONGEST)
     assert [answer.status_code for answer in answers] == [201, 201]
     assert answers[0].json() == answers[1].json()
+
+
+def test_what_looked_odd_is_told_until_it_is_accepted(own_live: LiveServer, shared_cases: Path) -> None:
+    chief = own_live.script("chief", Role.ADMIN)
+    taken = upload(chief, packed(shared_cases / "55-pose-in-opengl-axes"), "odd.zip").json()
+    (warning,) = taken["warnings"]
+    assert "behind the camera" in warning["text"] and warning["images"] == ["test/000001, image 0"]
+    assert not warning["accepted"]
+    operator = own_live.script("an operator", Role.OPERATOR)
+    assert sentence(operator.post(f"/api/datasets/{taken['id']}/warnings/accept"), 403)
+    accepted = chief.post(f"/api/datasets/{taken['id']}/warnings/accept").json()
+    assert accepted["warnings"] == [{**warning, "accepted": True}]
+    assert chief.get(f"/api/datasets/{taken['id']}").json()["warnings"] == accepted["warnings"]
+
+
+def test_depth_in_another_unit_is_refused_with_what_would_do(
+    own_live: LiveServer, shared_cases: Path
+) -> None:
+    chief = own_live.script("chief", Role.ADMIN)
+    content = packed(shared_cases / "23-depth-scale-1000")
+    before = rows_of(own_live)
+    refused = upload(chief, content, "units.zip")
+    assert "depth_scale 1000" in sentence(refused, 422)
+    assert rows_of(own_live) == before
+    suggested = refused.json()["suggested"]
+    assert suggested == {"depth_scale": 1.0}
+    file = {"file": ("units.zip", content, "application/zip")}
+    for wrong in ("0", "-1", "nan", "inf", "much"):
+        assert "depth" in sentence(chief.post("/api/datasets", files=file, data={"depth_scale": wrong}), 422)
+    taken = chief.post("/api/datasets", files=file, data=suggested)
+    assert taken.status_code == 201 and taken.json()["tasks"] == 1

@@ -179,3 +179,38 @@ def test_an_export_that_the_server_left_unfinished_has_failed(state_dir: Path, c
         found = restarted.script("chief", Role.ADMIN).get("/api/exports").json()["items"]
     told = [(export["state"], export["message"]) for export in found]
     assert told == [("failed", INTERRUPTED), ("failed", INTERRUPTED), ("done", "before")]
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"scene_ids": [10_000]}, "scene 10000 is not of dataset 1"),
+        ({"scene_ids": []}, "body.scene_ids"),
+        ({"format": "zip"}, "body.format"),
+        ({"without": [0]}, "body.without"),
+    ],
+)
+def test_a_part_that_is_none_is_refused(
+    chief: httpx.Client, done: dict[str, Any], asked: dict[str, Any], words: str
+) -> None:
+    answer = chief.post("/api/exports", json={"dataset_id": done["dataset_id"], **asked})
+    assert words in sentence(answer, 422)
+
+
+def test_one_scene_as_poses_alone(chief: httpx.Client, done: dict[str, Any]) -> None:
+    scene = chief.get("/api/scenes", params={"dataset_id": done["dataset_id"]}).json()["items"][0]
+    asked = {"dataset_id": done["dataset_id"], "format": "csv", "scene_ids": [scene["id"]]}
+    export_id = chief.post("/api/exports", json=asked).json()["id"]
+
+    def ended() -> dict[str, Any] | None:
+        found = chief.get(f"/api/exports/{export_id}").json()
+        return found if found["state"] in {"done", "failed"} else None
+
+    export = wait_until(ended, "the export to end")
+    assert (export["state"], export["format"], export["scene_ids"]) == ("done", "csv", [scene["id"]])
+    assert export["failures"] == []
+    with zipfile.ZipFile(io.BytesIO(chief.get(export["download_url"]).content)) as archive:
+        (name,) = archive.namelist()
+        rows = archive.read(name).decode().splitlines()
+    assert rows[0] == "scene_id,im_id,obj_id,score,R,t,time" and len(rows) > 1
+    assert sentence(chief.get(f"/api/exports/{export_id}/failures/1.jpg"), 404)

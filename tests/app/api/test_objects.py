@@ -8,6 +8,7 @@ import pytest
 
 from app.importing import import_dataset
 from registration_core import ObjectModel
+from registration_core.mesh_file import plain_ply, read_mesh
 from tests.app.live import LiveServer
 from tests.app.rest import sentence
 from tests.app.small_dataset import BLOCK, TOOL, change_json
@@ -52,6 +53,37 @@ def test_the_mesh_for_outlines_is_in_metres_and_kept_by_the_browser(
         assert np.allclose(vertices.max(axis=0), model.vertices.max(axis=0))
         assert face_count == len(model.faces)
     assert len({item["outline_mesh_url"].partition("content=")[2] for item in objects}) == len(objects)
+
+
+def test_the_mesh_in_its_own_colours_is_there_where_it_has_any(
+    server: LiveServer, operator: httpx.Client, objects: list[dict], demo_copy: Path
+) -> None:
+    plain = f"/api/objects/{objects[0]['id']}"
+    assert operator.get(plain).json()["textured_mesh_url"] is None
+    assert "no colours" in sentence(operator.get(f"{plain}/textured.mesh"), 404)
+
+    path = demo_copy / f"models/obj_{TOOL:06d}.ply"
+    mesh = read_mesh(path.read_bytes(), "ply")
+    mesh.visual.vertex_colors = [10, 20, 30, 255]
+    path.write_bytes(plain_ply(mesh))
+    import_dataset(server.services.database, server.services.files, demo_copy, "coloured")
+    url = textured_url(operator, "coloured")
+    answer = operator.get(url)
+    assert "immutable" in answer.headers["cache-control"]
+    vertex_count, face_count, picture_size = np.frombuffer(answer.content, "<u4", 3)
+    assert (vertex_count, face_count, picture_size) == (len(mesh.vertices), len(mesh.faces), 0)
+    vertices = np.frombuffer(answer.content, "<f4", 3 * vertex_count, 12).reshape(-1, 3)
+    assert np.allclose(vertices, mesh.vertices / 1000.0, atol=1e-6)
+    colors = answer.content[12 + 12 * vertex_count + 12 * face_count :]
+    assert colors == bytes([10, 20, 30, 255]) * vertex_count
+
+
+def textured_url(operator: httpx.Client, dataset: str) -> str:
+    """Of the first object of a dataset."""
+    datasets = operator.get("/api/datasets").json()["items"]
+    (dataset_id,) = [one["id"] for one in datasets if one["name"] == dataset]
+    items = operator.get(f"/api/objects?dataset_id={dataset_id}").json()["items"]
+    return operator.get(f"/api/objects/{items[0]['id']}").json()["textured_mesh_url"]
 
 
 def test_symmetries_are_in_metres(server: LiveServer, operator: httpx.Client, demo_copy: Path) -> None:

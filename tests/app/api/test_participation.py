@@ -36,6 +36,7 @@ OWN = {
     "/api/frames/{frame_id}/color.png",
     "/api/objects/{object_id}",
     "/api/objects/{object_id}/outline.mesh",
+    "/api/objects/{object_id}/textured.mesh",
     "/api/snaps/{snap_id}",
     "/api/searches/{search_id}",
 }
@@ -81,6 +82,18 @@ def test_the_way_from_consent_to_thanks(server, chief):
     assert (place["done"], place["total"], place["screens"]) == (4, 4, ["thanks"])
     (row,) = chief.get(f"/api/studies/{study['id']}").json()["participants"]
     assert row["finished_at"] and row["answers"] == {QUESTION["text"]: "no"}
+
+
+def test_the_page_is_told_what_may_be_left_empty_and_what_is_offered(server, chief):
+    optional = {"text": "Hand?", "choices": ["left", "right"], "optional": True}
+    study = new_study(chief, practice=[], questions=[QUESTION, optional])
+    client = take_part(server, invite(chief, study)["link"])
+    assert next_of(client)["questions"] == [
+        QUESTION | {"optional": False},
+        optional | {"choices": ["left", "right", "Rather not say"]},
+    ]
+    answered = client.post("/api/participation/answers", json={"answers": {QUESTION["text"]: "no"}})
+    assert answered.json()["screens"] == ["instructions", "task"]
 
 
 def test_who_stopped_goes_on_where_they_were(server, chief, study):

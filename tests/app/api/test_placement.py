@@ -37,7 +37,7 @@ def last_technique(client: httpx.Client, registration: dict[str, Any]) -> str:
 
 def open_view(live: LiveServer, seat: Seat) -> ViserClient:
     """A page that looks from (1, 1, 1) at the origin of the world, with z up."""
-    client = ViserClient(f"ws://127.0.0.1:{live.services.desk.view_port(seat)}/")
+    client = ViserClient(live.services.desk.view_socket(seat))
     view = seat.view
     assert view is not None
     wait_until(lambda: view.viewpoint is not None, "the page to be known")

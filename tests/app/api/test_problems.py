@@ -77,7 +77,7 @@ def test_on_a_full_disk_nothing_changes_and_all_goes_on_when_there_is_room(own_l
     assert kinds(script, registration["id"])[-2:] == ["set_pose", "submit"]
 
 
-def test_a_file_that_is_gone_is_an_unexpected_error(own_live: LiveServer) -> None:
+def test_a_file_that_is_gone_is_named_with_what_brings_it_back(own_live: LiveServer) -> None:
     script = own_live.script("robot", Role.ADMIN)
     frame = script.get("/api/scenes").json()["items"][0]["frames"][0]
     for path in own_live.services.files.root.rglob("*"):
@@ -85,7 +85,7 @@ def test_a_file_that_is_gone_is_an_unexpected_error(own_live: LiveServer) -> Non
             path.unlink()
     for url in (frame["depth_url"], frame["color_url"], "/api/tasks/1/thumbnail.jpg"):
         said = sentence(script.get(url), 500)
-        assert "the server's log says" in said
+        assert "is missing on the disk" in said and "import dataset 'tools' again" in said
         assert "/" not in said and "Error" not in said
     assert script.get("/api/me").status_code == 200
 

@@ -4,6 +4,7 @@ import itertools
 import json
 import time
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from typing import Any
 
 import httpx
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from app.api import registration_stream
-from app.auth import Actor
+from app.auth import Actor, Identity, Role
 from registration_core import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, put_pose, url_of
@@ -22,6 +23,11 @@ from tests.app.waiting import LONGEST, wait_until
 @pytest.fixture
 def registration(script: httpx.Client) -> dict[str, Any]:
     return begin(script)
+
+
+def tasks_of(client: httpx.Client) -> list[dict[str, Any]]:
+    """As the list of tasks has them."""
+    return client.get("/api/tasks").json()["items"]
 
 
 def messages(answer: httpx.Response) -> Iterator[dict[str, Any]]:
@@ -117,3 +123,51 @@ def test_a_newer_page_takes_over_and_the_older_says_so(
             changed = put_pose(script, registration, true_pose(TOOL)).json()
             assert next(told) == changed
             assert next(watched) == changed
+
+
+def test_a_stream_tells_who_else_has_the_task_open(live: LiveServer, script: httpx.Client) -> None:
+    ann, bob = live.person("ann of the task"), live.person("bob of the task")
+    hers, his, watched, elsewhere = begin(ann), begin(bob), begin(script), begin(bob, 1)
+
+    def here() -> set[str]:
+        return {who["name"] for who in tasks_of(script)[0]["operators"] if who["is_here"]}
+
+    def opened(client: httpx.Client, registration: dict[str, Any]) -> AbstractContextManager[httpx.Response]:
+        return client.stream(
+            "GET", f"{url_of(registration)}/stream", params={"page": str(registration["id"])}
+        )
+
+    with opened(ann, hers) as answer:
+        told = messages(answer)
+        assert next(told)["others"] == []
+        with (
+            opened(bob, elsewhere),
+            script.stream("GET", f"{url_of(watched)}/stream"),  # a script watches, and is no page
+            opened(bob, his) as seen_by_bob,
+        ):
+            told_to_bob = messages(seen_by_bob)
+            assert next(told_to_bob)["others"] == ["ann of the task"]
+            assert next(told)["others"] == ["bob of the task"]
+            assert here() == {"ann of the task", "bob of the task"}
+        assert next(told)["others"] == []
+    wait_until(lambda: here() == set(), "all to leave")
+
+
+def test_who_takes_part_in_a_study_and_others_do_not_see_each_other(
+    live: LiveServer, script: httpx.Client
+) -> None:
+    ordinary = live.person("operator beside a study")
+    registration = begin(ordinary)
+    name = "P77 beside an operator"
+    user = live.services.auth.ensure_user(name, Role.PARTICIPANT)
+    trial = live.services.desk.start(
+        registration["task_id"], Identity(user.id, name, Role.PARTICIPANT, Actor.HUMAN)
+    )
+    url = f"{url_of(registration)}/stream"
+    stand_up = trial.chair.sit("a trial's page", lambda: None)
+    with ordinary.stream("GET", url, params={"page": "ordinary"}) as answer:
+        told = messages(answer)
+        assert next(told)["others"] == []
+        assert trial.others() == ()
+    assert name not in str(tasks_of(script))
+    stand_up()

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import asdict
 from typing import Any
 
 import httpx
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from app.auth import Role
+from app.labeling.layers import Layers
 from registration_core import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, log_of, put_pose, sentence, shown, url_of
@@ -46,9 +48,9 @@ def test_every_change_has_a_larger_revision(live: LiveServer, script: httpx.Clie
 
 
 def test_layers_are_chosen(script: httpx.Client, registration: dict[str, Any]) -> None:
-    assert registration["layers"] == {"cloud": True, "mesh": True, "fine": True, "agreement": False}
+    assert registration["layers"] == asdict(Layers())
     url = f"{url_of(registration)}/layers"
-    chosen = {"cloud": False, "mesh": True, "fine": False, "agreement": True}
+    chosen = {"cloud": False, "mesh": True, "texture": False, "fine": False, "agreement": True}
     assert script.put(url, json=chosen).json()["layers"] == chosen
     assert "cloud" in sentence(script.put(url, json={"cloud": "maybe"}), 422)
 

@@ -43,6 +43,8 @@ def test_a_report_tells_curves_and_all_that_is_read_off_them(url, reviewer):
         and cell["stg"]["default"]["points"][-1]["share"] == 0.0
     )
     assert cell["stg"]["default"]["hand_off"]["saved"] == pytest.approx(5.9)
+    assert cell["stg"]["default"]["hand_off"]["caution"].startswith("This point tells little: 2 operators")
+    assert cell["human"]["fitts_caution"].startswith("There is no line") == (cell["human"]["fitts"] is None)
     assert any("a snap worsens it; rotation error" in gain["sentence"] for gain in report["gains"])
     assert "group expert" in [remark["about"] for remark in report["remarks"]]
 

@@ -1,6 +1,9 @@
 """What else is in the scene, over REST."""
 
+from datetime import UTC, datetime
+
 import numpy as np
+import pytest
 
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, sentence
@@ -25,6 +28,19 @@ def test_things_of_the_scene_and_whether_they_are_shown(own_live: LiveServer) ->
     assert "of yours" in sentence(own_live.script("bob").get(things), 404)
 
 
+def test_the_newest_pose_of_others_is_told_also_where_the_clock_was_put_back(
+    own_live: LiveServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    carol = own_live.script("carol")
+    things = f"/api/registrations/{begin(carol, 0)['id']}/things"
+    for name, hour in (("ann", 13), ("bob", 12), ("dan", 12)):
+        registration = begin(own_live.script(name), 1)
+        now = datetime(2026, 3, 4, hour, tzinfo=UTC)
+        monkeypatch.setattr(own_live.services.log.clock, "utc", lambda now=now: now)
+        assert own_live.clients[-1].post(f"/api/registrations/{registration['id']}/submit").status_code == 200
+        assert carol.get(things).json()["items"][1]["registration_id"] == registration["id"]
+
+
 def test_skipping_and_reopening(own_live: LiveServer) -> None:
     ann, bob = own_live.script("ann"), own_live.script("bob")
     mine = begin(ann, 0)
@@ -39,6 +55,7 @@ def test_skipping_and_reopening(own_live: LiveServer) -> None:
         "state": "skipped",
         "skip_reason": "ambiguous",
         "registration_id": mine["id"],
+        "is_here": False,
         "assessment": None,
     }
     assert task["operators"] == [ended]

@@ -101,3 +101,21 @@ def test_lists_come_in_pages(operator: httpx.Client) -> None:
 @pytest.mark.parametrize("url", ["scenes/999", "frames/999/color.png", "frames/999/depth.png"])
 def test_what_does_not_exist_is_said(operator: httpx.Client, url: str) -> None:
     assert "999" in sentence(operator.get(f"/api/{url}"), 404)
+
+
+def test_a_damaged_picture_is_said_by_its_name_and_not_handed_out(
+    server: LiveServer, scenes: list[dict], operator: httpx.Client, demo: Path
+) -> None:
+    frame = scenes[0]["frames"][1]
+    digest = server.services.files.put_file(demo / POSED_SCENE / "depth/000005.png")
+    path = server.services.files.path(digest)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-5] + b"wrong")
+    try:
+        for url in (frame["depth_url"], frame["raw_depth_url"]):
+            message = sentence(operator.get(url), 500)
+            assert message.startswith("the depth image of image 5 in scene 1 of dataset 'tools' is damaged")
+            assert message.endswith("import dataset 'tools' again, which puts it back.")
+    finally:
+        path.write_bytes(whole)
+    assert operator.get(frame["depth_url"]).content == whole

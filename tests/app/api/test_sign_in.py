@@ -6,7 +6,8 @@ import httpx
 import pytest
 
 from app.api.dependencies import SESSION_COOKIE
-from app.auth import FREE_ATTEMPTS, LOGIN_LIFETIME, Role
+from app.auth import LOGIN_LIFETIME, Role
+from app.throttle import FREE_ATTEMPTS
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, sentence
 

@@ -1,5 +1,8 @@
 """Studies for those who run them: set up, previewed, followed, closed; erased and withdrawn participants."""
 
+import csv
+import io
+
 import httpx
 import pytest
 
@@ -13,6 +16,7 @@ def test_the_order_is_shown_before_anything_is_kept(chief):
     answer = chief.post("/api/studies/preview", json={"plan": plan, "seed": 5})
     preview = answer.json()
     assert preview["rows_of_balance"] == 2
+    assert preview["minutes"] in (7.0, 8.0) and preview["minutes_a_task"] == {"accurate": 2.0, "quick": 1.0}
     first, second = preview["orders"]
     assert [slot["is_practice"] for slot in first] == [True] + [False] * 4
     assert {slot["mode"] for slot in first[1:3]} != {slot["mode"] for slot in second[1:3]}
@@ -71,6 +75,28 @@ def test_progress_tells_how_far_everybody_is(server, chief):
     assert [(p["code"], p["group"], p["done"], p["total"]) for p in participants] == [
         ("P01", "novice", 1, 4),
         ("P02", "expert", 0, 4),
+    ]
+
+
+def test_answers_are_a_table_that_tells_empty_from_declined_and_runs_nothing(server, chief):
+    optional = {"text": "Hand?", "choices": ["left", "right"], "optional": True}
+    free = {"text": "Where?", "optional": True}
+    study = new_study(chief, questions=[optional, free])
+    for answers in ({"Where?": '=HYPERLINK("http://x","y")'}, {"Hand?": "Rather not say"}):
+        client = take_part(server, invite(chief, study, "expert")["link"])
+        assert client.post("/api/participation/answers", json={"answers": answers}).status_code == 200
+    gone = invite(chief, study)
+    left = take_part(server, gone["link"])
+    assert left.post("/api/participation/answers", json={"answers": {"Hand?": "left"}}).status_code == 200
+    chief.post(f"/api/studies/{study['id']}/participants/{gone['id']}/withdraw")
+    answer = chief.get(f"/api/studies/{study['id']}/answers.csv")
+    assert answer.headers["content-type"] == "text/csv; charset=utf-8"
+    assert list(csv.reader(io.StringIO(answer.text))) == [
+        ["code", "group", "is_simulated", "question", "answer", "status"],
+        ["P01", "expert", "False", "Hand?", "", "left empty"],
+        ["P01", "expert", "False", "Where?", '\'=HYPERLINK("http://x","y")', "answered"],
+        ["P02", "expert", "False", "Hand?", "Rather not say", "declined"],
+        ["P02", "expert", "False", "Where?", "", "left empty"],
     ]
 
 

@@ -6,9 +6,12 @@ from pathlib import Path
 import httpx
 import pytest
 from PIL import Image
+from sqlalchemy import select
 
+from app.analysis.runs import TASK_PARTS, place_name
 from app.auth import Role
 from app.importing import import_dataset
+from app.tables import Task
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 
@@ -119,6 +122,25 @@ def test_the_next_task_is_mine_or_nobodys(own_live: LiveServer) -> None:
     assert fourth in ids(ann, state="submitted")
 
 
+def test_the_next_task_stays_among_those_that_are_asked_for(own_live: LiveServer, demo: Path) -> None:
+    services = own_live.services
+    other = import_dataset(services.database, services.files, demo, "others").dataset_id
+    ann, bob = own_live.script("ann"), own_live.script("bob")
+
+    def next_of(client: httpx.Client, **query: object) -> int:
+        return client.get("/api/tasks/next", params=query).json()["id"]
+
+    there = ids(ann, dataset_id=other)
+    assert next_of(ann) < next_of(ann, dataset_id=other) == there[0]
+    scene_id = items(ann, dataset_id=other)[-1]["scene"]["id"]
+    assert next_of(ann, scene_id=scene_id) == ids(ann, scene_id=scene_id)[0]
+
+    submit(bob, begin(bob, 0)["id"])
+    assert next_of(ann, state="submitted") == ids(ann)[0]  # I have not begun it
+    submit(ann, begin(ann, 0)["id"])
+    assert "All tasks" in sentence(ann.get("/api/tasks/next", params={"state": "submitted"}), 404)
+
+
 def test_an_administrator_asks_for_more(own_live: LiveServer) -> None:
     chief = own_live.script("chief", Role.ADMIN)
     task = items(chief)[0]
@@ -130,11 +152,35 @@ def test_an_administrator_asks_for_more(own_live: LiveServer) -> None:
     assert (answer.json()["instance"], answer.json()["instances"]) == (1, 2)
     other = chief.post("/api/tasks", json={**wanted, "mode": "quick", "condition": "manual"}).json()
     assert (other["mode"], other["condition"]) == ("quick", "manual")
-    assert (other["instance"], other["instances"]) == (0, 1)
+    assert (other["instance"], other["instances"]) == (0, 2)  # the same two, whatever is asked of them
+    assert ids(chief, mode="quick") == ids(chief, condition="manual") == [other["id"]]
+    assert ids(chief, mode="quick", condition="snap") == []
+    assert chief.get("/api/tasks/next", params={"mode": "quick"}).json()["id"] == other["id"]
+    dataset = chief.get(f"/api/datasets/{task['dataset']['id']}").json()
+    assert (dataset["modes"], dataset["conditions"]) == (["accurate", "quick"], ["manual", "snap"])
     assert ids(chief) == [*before, answer.json()["id"], other["id"]]
     started = chief.post(f"/api/tasks/{other['id']}/registration")
     assert started.status_code == 200
     assert started.json()["task_id"] == other["id"]
+
+
+def test_a_thing_has_one_name_everywhere(own_live: LiveServer) -> None:
+    chief = own_live.script("who asks for names", Role.ADMIN)
+    task = items(chief)[1]
+    wanted = {"scene_id": task["scene"]["id"], "object_id": task["object"]["id"]}
+    second, quick = (
+        chief.post("/api/tasks", json={**wanted, **more}).json() for more in ({}, {"mode": "quick"})
+    )
+    names = [chief.get(f"/api/tasks/{one['id']}").json()["name"] for one in (task, second, quick)]
+    assert names == ["block #1", "block #2", "block #1"]
+    begun = chief.post(f"/api/tasks/{second['id']}/registration").json()
+    things = chief.get(f"/api/registrations/{begun['id']}/things").json()["items"]
+    assert {"block #1", "block #2"} <= {thing["name"] for thing in things}
+    with own_live.services.database.read() as session:
+        rows = session.scalars(
+            select(Task).where(Task.id.in_([task["id"], second["id"], quick["id"]])).options(*TASK_PARTS)
+        )
+        assert [place_name(row).rsplit(", ", 1)[1] for row in rows] == names
 
 
 def test_a_task_for_what_does_not_exist_is_refused(

@@ -70,8 +70,8 @@ def test_objects_behind_the_camera_have_no_entry_and_those_beside_the_image_have
 def test_masks_are_what_another_renderer_draws(exported: ExportedSite, dataset: BopDataset) -> None:
     caster = RayCaster(dataset.objects)
     for _, _, image in labelled_images(dataset):
-        folder = image.depth_path.parents[1]
-        observed = read_depth(image.depth_path, image.depth_scale)
+        folder = image.depth.path.parents[1]
+        observed = read_depth(image.depth.path, image.depth_scale)
         for index, truth in enumerate(image.ground_truth):
             name = f"{image.image_id:06d}_{index:06d}.png"
             rendered = caster.depth(truth.obj_id, image.camera, truth.T_camera_object)
@@ -106,10 +106,10 @@ def test_images_and_meshes_are_the_stored_bytes(exported: ExportedSite, dataset:
     for found in dataset.objects:
         assert found.mesh_path.read_bytes() == site.files.read(meshes[found.obj_id])
     for _, _, image in labelled_images(dataset):
-        assert site.files.put_file(image.depth_path) in depths
+        assert site.files.put_file(image.depth.path) in depths
 
 
-def test_pictures_keep_their_kind(exported: ExportedSite) -> None:
+def test_the_pictures_of_a_scene_lie_together(exported: ExportedSite) -> None:
     pictures = {
         path.relative_to(exported.root).as_posix()
         for path in exported.root.rglob("*")
@@ -117,9 +117,9 @@ def test_pictures_keep_their_kind(exported: ExportedSite) -> None:
     }
     assert pictures == {
         "test/000001/rgb/000000.png",
-        "test/000001/gray/000005.png",
+        "test/000001/rgb/000005.png",
         "test/000002/rgb/000000.png",
-        "test/000002/gray/000004.jpg",
+        "test/000002/rgb/000004.jpg",
     }
 
 

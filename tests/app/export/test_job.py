@@ -1,22 +1,27 @@
 """Whole exports: the same bytes each time, nothing half-written, and a job that says how it ended."""
 
+import csv
 import errno
 import json
 import os
 import subprocess
 import sys
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from sqlalchemy import select
 
 from app.export import job
 from app.export.gate_instance import GateError
 from app.export.job import ExportSummary, export_dataset, run_job
 from app.export.selection import ExportError
-from app.tables import Export
+from app.tables import Export, Scene, User
 from registration_core import pose
+from registration_core.bop import read_dataset
 
 from .site import NEAR_VIEW, POSED, TOOL, Site, ignore_progress, true_pose
 
@@ -25,10 +30,11 @@ def export(site: Site, target: Path) -> ExportSummary:
     return export_dataset(site.database, site.files, site.dataset_id, target, ignore_progress)
 
 
-def request(site: Site) -> int:
+def request(site: Site, scene_ids: list[int] | None = None, without: Sequence[int] = ()) -> int:
     """A queued export; its id."""
+    choice = {"scene_ids": scene_ids, "without": list(without)}
     with site.database.write() as session:
-        row = Export(dataset_id=site.dataset_id, format="bop", user_id=site.users[0])
+        row = Export(dataset_id=site.dataset_id, format="bop", choice=choice, user_id=site.users[0])
         session.add(row)
         session.flush()
         return row.id
@@ -39,11 +45,11 @@ def row_of(site: Site, export_id: int) -> Export:
         return session.get_one(Export, export_id)
 
 
-def submit_floating(site: Site) -> None:
+def submit_floating(site: Site, user: int = 0) -> None:
     """A pose 6 cm too near to the camera of image 0: the tool floats in the air."""
     T_camera_object = pose.inverse(NEAR_VIEW) @ true_pose(POSED, TOOL)
     T_camera_object[2, 3] -= 0.06
-    site.submit(site.tasks[POSED, TOOL], NEAR_VIEW @ T_camera_object)
+    site.submit(site.tasks[POSED, TOOL], NEAR_VIEW @ T_camera_object, user, minutes=1.0)
 
 
 def test_the_same_annotations_give_the_same_bytes(site: Site, tmp_path: Path) -> None:
@@ -139,7 +145,70 @@ def test_a_failed_job_says_why_and_serves_nothing(site: Site, prepare: object, m
     assert not run_job(site.database, site.files, export_id)
     row = row_of(site, export_id)
     assert row.state == "failed" and message in row.message and row.file_hash is None
-    assert sorted(site.files.root.rglob("*")) == stored
+    pictures = {site.files.path(failure["picture_hash"]) for failure in row.failures}
+    new = set(site.files.root.rglob("*")) - set(stored)
+    assert {path for path in new if path.is_file()} == pictures
+
+
+def test_objects_that_do_not_pass_are_named_and_the_rest_goes_without_them(site: Site) -> None:
+    site.submit_all()
+    submit_floating(site, user=1)
+    export_id = request(site)
+    assert not run_job(site.database, site.files, export_id)
+    (failure,) = row_of(site, export_id).failures
+    with site.database.read() as session:
+        operator = session.get_one(User, site.users[1]).name
+    assert (failure["object"], failure["scene"], failure["image_id"]) == ("angle tool", "test/000001", 0)
+    assert failure["operator"] == operator and failure["task_id"] == site.tasks[POSED, TOOL]
+    assert "64 mm off" in failure["reason"]
+    with Image.open(site.files.path(failure["picture_hash"])) as picture:
+        picture.load()
+        assert picture.format == "JPEG" and (np.asarray(picture).std() > 5)
+    rest = request(site, without=[failure["registration_id"]])
+    assert run_job(site.database, site.files, rest)
+    assert row_of(site, rest).message == "Scenes: 2, images: 7, annotated objects: 6."  # the one before it
+
+
+def test_a_pose_out_of_all_reach_is_named(site: Site) -> None:
+    site.submit_all()
+    T = np.eye(4)
+    T[0, 3] = 1e308
+    site.submit(site.tasks[POSED, TOOL], T, user=1, minutes=1.0)
+    export_id = request(site)
+    assert not run_job(site.database, site.files, export_id)
+    row = row_of(site, export_id)
+    assert "object 3" in row.message and "out of all reach" in row.message
+    assert [failure["object"] for failure in row.failures] == ["angle tool"]
+
+
+def test_one_scene_alone(site: Site) -> None:
+    site.submit_all()
+    with site.database.read() as session:
+        scene = session.scalars(select(Scene).where(Scene.label == POSED)).one()
+    export_id = request(site, scene_ids=[scene.id])
+    assert run_job(site.database, site.files, export_id)
+    assert row_of(site, export_id).message.startswith("Scenes: 1,")
+
+
+def test_poses_alone_are_those_of_the_dataset(site: Site, tmp_path: Path) -> None:
+    site.submit_all()
+    export(site, tmp_path / "whole")
+    export_dataset(
+        site.database, site.files, site.dataset_id, tmp_path / "poses", ignore_progress, export_format="csv"
+    )
+    (path,) = (tmp_path / "poses").iterdir()
+    with path.open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    found = []
+    for scene in read_dataset(tmp_path / "whole").scenes:
+        for image in scene.images:
+            found += [(scene.scene_id, image.image_id, truth) for truth in image.ground_truth or ()]
+    assert len(rows) == len(found) > 0
+    for row, (scene_id, image_id, truth) in zip(rows, found, strict=True):
+        assert (int(row["scene_id"]), int(row["im_id"])) == (scene_id, image_id)
+        assert int(row["obj_id"]) == truth.obj_id
+        assert np.allclose(np.array(row["R"].split(), float), truth.T_camera_object[:3, :3].ravel())
+        assert np.allclose(np.array(row["t"].split(), float) / 1000, truth.T_camera_object[:3, 3])
 
 
 @pytest.mark.parametrize(

@@ -5,41 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from sqlalchemy import select
 
-from app.database import Database
-from app.export.job import export_dataset
-from app.importing import import_dataset
-from app.storage import FileStore
-from app.tables import Registration, Task, User
 from registration_core import pose
 from registration_core.bop import read_dataset
 
-from .site import START, ignore_progress
-
-
-def labelled_export(source: Path, folder: Path) -> Path:
-    """Import a dataset, submit every known pose, export it."""
-    database, files = Database(f"sqlite:///{folder / 'snap6d.sqlite'}"), FileStore(folder / "files")
-    database.migrate()
-    dataset_id = import_dataset(database, files, source).dataset_id
-    with database.write() as session:
-        user = User(name="Ada Lovelace", role="operator")
-        session.add(user)
-        session.flush()
-        for task in session.scalars(select(Task)):
-            session.add(
-                Registration(
-                    task_id=task.id,
-                    user_id=user.id,
-                    state="submitted",
-                    T_world_object=task.T_world_object_reference,
-                    submitted_at=START,
-                )
-            )
-    export_dataset(database, files, dataset_id, folder / "export", ignore_progress)
-    database.close()
-    return folder / "export"
+from .labelled import labelled_export
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("ycbv", 1e-9), ("bunny", 0.02)])
@@ -55,7 +25,7 @@ def test_official_poses_come_back(name: str, tolerance: float, shared_data: Path
             distance = pose.distance(official.T_camera_object, truth.T_camera_object)
             assert distance.translation < tolerance
         assert (here.T_world_camera is None) == (there.T_world_camera is None)
-        assert here.depth_path.read_bytes() == there.depth_path.read_bytes()
+        assert here.depth.path.read_bytes() == there.depth.path.read_bytes()
 
 
 def test_the_mug_is_a_quarter_hidden(shared_data: Path, tmp_path: Path) -> None:

@@ -1,14 +1,19 @@
 """Which images and which of several poses go into an export."""
 
+from datetime import datetime, timedelta
+
 import numpy as np
 import pytest
 
+from app.auth import Actor
+from app.clock import Clock
+from app.event_log import EventLog, NewEvent
 from app.export.dataset_info import dataset_info
 from app.export.selection import ExportError, Selection, select_dataset
 from app.tables import Registration, Scene
 from registration_core import pose
 
-from .site import BLOCK, POSED, TOOL, UNPOSED, Site, true_pose
+from .site import BLOCK, POSED, START, TOOL, UNPOSED, Site, true_pose
 
 
 def selected(site: Site) -> Selection:
@@ -80,6 +85,25 @@ def test_of_several_submissions_the_newest_is_kept(site: Site) -> None:
     assert annotation.candidates == 2
 
 
+@pytest.mark.parametrize("step", [timedelta(hours=1), timedelta(days=365)])
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_the_newest_is_kept_also_where_the_clock_was_put(site: Site, step: timedelta, direction: int) -> None:
+    class PutClock(Clock):
+        def utc(self) -> datetime:
+            return START + next(steps)
+
+    steps = iter([timedelta(), direction * step])
+    task, newer = site.tasks[POSED, TOOL], true_pose(POSED, TOOL) @ pose.exp([0.001, 0, 0, 0, 0, 0])
+    log = EventLog(site.database, PutClock())
+    for user, T in ((1, true_pose(POSED, TOOL)), (0, newer)):
+        with site.database.write() as session:
+            row = Registration(task_id=task, user_id=site.users[user])
+            session.add(row)
+        log.append(row.id, row.user_id, NewEvent("submit", Actor.HUMAN, T_after=T.tolist()))
+    (annotation,) = selected(site).annotations
+    np.testing.assert_array_equal(annotation.T_world_object, newer)
+
+
 def test_tasks_of_several_conditions_for_one_thing_give_one_annotation_the_accurate_one(site: Site) -> None:
     quick = site.add_task(POSED, TOOL, mode="quick")
     site.submit(quick, np.eye(4), minutes=9.0)
@@ -96,6 +120,7 @@ def test_instances_of_one_object_stay_apart(site: Site) -> None:
     site.submit(site.tasks[POSED, TOOL], true_pose(POSED, TOOL))
     image = selected(site).scenes[0].images[0]
     assert [(found.obj_id, found.instance) for found in image.annotations] == [(TOOL, 0), (TOOL, 1)]
+    assert [found.name.rsplit(" ", 1)[1] for found in image.annotations] == ["#1", "#2"]
 
 
 def test_an_image_id_that_two_worlds_share_is_refused(site: Site) -> None:

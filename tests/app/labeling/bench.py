@@ -7,7 +7,7 @@ import numpy as np
 
 from app.event_log import NewEvent
 from app.labeling.assessment import Assessed, Assessment
-from app.labeling.history import History, Step
+from app.labeling.history import replay
 from app.labeling.search import SearchOrder, SearchResult
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
@@ -161,7 +161,7 @@ class Bench:
         """Frames that are not used and see the object."""
         self.session = LabelingSession(
             registration_id=7,
-            history=History((Step(START),)),
+            history=replay(START, ()),
             state=state,
             frame_id=FRAMES[0],
             frame_ids=FRAMES,

@@ -58,12 +58,12 @@ def free(motion="turn", axis=X, extent=0.2) -> Ambiguity:
         ),
         (
             estimate(0.95, GOOD, free(axis=(0.6, 0.6, 0.52))),
-            "look: depth does not tell the turn about a slanted axis, ± 11°",
+            "look: depth does not tell the turn about a slanted axis, ± 22°",
         ),
         (estimate(0.95, GOOD, free(extent=2.0)), "look: depth does not tell the turn about the long axis"),
         (
             estimate(0.95, GOOD, free("shift", X, 0.02)),
-            "look: depth does not tell where it lies along the long axis, ± 20 mm",
+            "look: depth does not tell where it lies along the long axis, ± 39 mm",
         ),
         (
             estimate(0.95, replace(GOOD, behind=0.3, behind_by=0.0152, match=0.6)),

@@ -1,18 +1,24 @@
 """The desk opens sessions from the log, keeps them apart by user, and lets go of idle ones."""
 
+import errno
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 from app.auth import Actor, Role
 from app.labeling.desk import NotFoundError
+from app.recent import Recent
 from app.symmetries import decide
-from app.tables import Object
+from app.tables import Object, Participant, Registration, Study, Task, User, utc_now
 from registration_core import SnapConfig, SymmetryAxis, pose
 from tests.app.labeling.seats import shown, sign_up
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.rest import SLOW_SNAP
 from tests.app.small_dataset import TOOL, true_pose
-from tests.app.waiting import wait_until
+from tests.app.waiting import LONGEST, wait_until
 
 
 def test_a_registration_begins_at_the_tasks_start_pose(services, seat, ann):
@@ -41,6 +47,29 @@ def test_each_user_has_a_registration_of_their_own(services, seat, ann):
     services.desk.close_idle(0.0)
     with pytest.raises(NotFoundError, match="of yours"):
         services.desk.seat(seat.registration.id, bob)
+
+
+def test_nobody_waits_while_the_mesh_of_another_is_read(services, seat, ann):
+    asked, may_come = threading.Event(), threading.Event()
+    read = services.data._load_model
+
+    def slow(*arguments):
+        asked.set()
+        assert may_come.wait(LONGEST)
+        return read(*arguments)
+
+    services.data._model = Recent(1, slow)
+    with services.database.read() as session:
+        mine = seat.registration.task.object_id
+        task_id = session.scalars(select(Task.id).where(Task.object_id != mine)).first()
+    with ThreadPoolExecutor(2) as pool:
+        opening = pool.submit(services.desk.start, task_id, sign_up(services, "bob"))
+        try:
+            assert asked.wait(LONGEST)
+            assert pool.submit(services.desk.start, 1, ann).result(LONGEST) is seat
+        finally:
+            may_come.set()
+        assert opening.result(LONGEST).registration.task_id == task_id
 
 
 def test_the_log_may_be_read_by_its_owner_and_by_reviewers(services, seat, ann):
@@ -103,17 +132,17 @@ def test_closing_a_session_cancels_its_snap(services, seat, ann):
 
 
 def test_the_view_is_made_once_and_goes_with_the_session(services, seat, ann):
-    port = services.desk.view_port(seat)
-    assert services.desk.view_port(seat) == port
-    with ViserClient(f"ws://127.0.0.1:{port}/") as client:
+    path = services.desk.view_socket(seat)
+    assert services.desk.view_socket(seat) == path
+    with ViserClient(path) as client:
         cloud = client.node("PointCloudMessage", "/cloud")["props"]["points"].reshape(-1, 3)
         expected = services.data.cloud(seat.frames[seat.session.snapshot().frame_id])
         assert np.array_equal(cloud, expected.points)
     services.desk.close_idle(0.0)
-    with pytest.raises(ConnectionRefusedError):
-        ViserClient(f"ws://127.0.0.1:{port}/")
+    with pytest.raises(FileNotFoundError):
+        ViserClient(path)
     again = services.desk.seat(seat.registration.id, ann)
-    with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(again)}/") as client:
+    with ViserClient(services.desk.view_socket(again)) as client:
         client.node("MeshMessage", "/object/mesh")
 
 
@@ -134,3 +163,41 @@ def test_sessions_of_an_object_go_on_with_symmetries_that_are_decided_meanwhile(
     assert other.object.present.symmetries_version == 1
     services.desk.close_idle(0.0)
     assert services.desk.seat(seat.registration.id, ann).object.present.symmetries_version == 2
+
+
+def test_sessions_close_also_where_that_cannot_be_written_down(services, seat, ann, monkeypatch):
+    def refuse(*_arguments: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    other = services.desk.start(2, sign_up(services, "bob"))
+    for one in (seat, other):
+        one.session.snap(Actor.HUMAN, SnapConfig.from_dict(SLOW_SNAP))
+    with monkeypatch.context() as full:
+        full.setattr(services.log, "append", refuse)
+        assert services.desk.close_idle(0.0) == 2
+    again = services.desk.seat(seat.registration.id, ann)
+    assert again is not seat
+    again.session.set_pose(true_pose(TOOL), Actor.HUMAN)
+    wait_until(lambda: not services.snapper._pending, "the workers to be given up")
+    kinds = [event.kind for event in services.log.events(seat.registration.id)]
+    assert kinds == ["opened", "snap_requested", "set_pose"]
+
+
+def test_a_request_on_its_way_begins_nothing_for_who_has_withdrawn(services):
+    ann = sign_up(services, "ann")
+    with services.database.write() as session:
+        chief = User(name="chief", role="admin")
+        session.add(chief)
+        session.flush()
+        study = Study(name="s", plan={}, seed=1, user_id=chief.id)
+        session.add(study)
+        session.flush()
+        session.add(
+            Participant(
+                study_id=study.id, user_id=ann.user_id, code="P01", group="g", row=0, withdrawn_at=utc_now()
+            )
+        )
+    with pytest.raises(NotFoundError, match="withdrawn"):
+        services.desk.start(1, ann)
+    with services.database.read() as session:
+        assert session.scalars(select(Registration.id).filter_by(user_id=ann.user_id)).all() == []

@@ -3,8 +3,10 @@
 import numpy as np
 
 from app.auth import Actor
+from app.scene_data import camera_of
 from registration_core import SnapConfig, pose
 from registration_core.pose_error import adi
+from registration_core.problem import region_of_interest
 from tests.app.labeling.seats import shown, wait_for_snap
 from tests.app.small_dataset import TOOL, true_pose
 
@@ -34,6 +36,20 @@ def test_every_frame_of_a_scene_gives_the_same_pose(services, seat):
         found.append(shown(seat))
     assert len(found) == 2
     assert all(adi(T, true_pose(TOOL), seat.model.vertices) < 0.003 for T in found)
+
+
+def test_colours_go_with_the_frames_that_are_searched(services, seat, monkeypatch):
+    jobs = []
+    monkeypatch.setattr(services.snapper, "request", lambda job, *_: jobs.append(job) or (lambda: None))
+    seat.session.set_pose(true_pose(TOOL), Actor.HUMAN)
+    seat.session.snap(Actor.HUMAN, frames="current")
+    (job,) = jobs
+    searched, asked = job.views
+    assert job.used == 1 and asked.color is None
+    frame = seat.frames[seat.session.snapshot().frame_id]
+    whole, camera = services.data.aligned_color(frame), camera_of(frame)
+    left, top, width, height = region_of_interest(seat.model, camera, job.T_camera_object, job.config)
+    np.testing.assert_array_equal(searched.color, whole[top : top + height, left : left + width])
 
 
 def test_a_snap_out_of_view_fails_with_a_sentence(services, seat):

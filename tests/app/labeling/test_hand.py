@@ -47,6 +47,14 @@ def test_a_drag_that_goes_nowhere_is_no_change(bench):
     assert not bench.state.dragging
 
 
+@pytest.mark.parametrize("where", [1e308, -1e9, np.nan, np.inf])
+def test_a_drag_out_of_all_reach_leaves_the_object_where_it_was(bench, where):
+    far = shifted(0.01)
+    far[0, 3] = where
+    bench.drag(shifted(0.02), far)
+    assert np.array_equal(bench.state.T_world_object, shifted(0.02))
+
+
 def test_a_drag_that_a_lost_connection_ends_is_kept_and_told():
     bench = Bench(condition="auto")
     bench.session.start_drag()
@@ -140,3 +148,20 @@ def test_undo_brings_an_estimates_confidence_back(bench):
     assert bench.state.confidence is None
     bench.session.undo(Actor.HUMAN)
     assert bench.state.confidence == 0.8
+
+
+def test_what_the_machine_found_and_the_operator_took_is_the_machines(bench):
+    assert bench.state.posed_by == "start"
+    bench.session.set_pose(shifted(0.01), Actor.HUMAN, "proposal")
+    assert bench.state.posed_by == "machine"
+    bench.session.start_drag()
+    assert bench.state.posed_by == "human"
+    bench.session.drag_to(shifted(0.02))
+    bench.session.end_drag()
+    assert bench.state.posed_by == "human"
+    bench.session.reset(Actor.HUMAN)
+    assert bench.state.posed_by == "start"
+    bench.session.undo(Actor.HUMAN)
+    bench.session.undo(Actor.HUMAN)
+    bench.session.submit(Actor.HUMAN)
+    assert bench.state.posed_by == "machine"

@@ -142,3 +142,18 @@ def test_a_step_past_either_end_is_a_programming_error():
         History((Step(START),)).undone()
     with pytest.raises(AssertionError):
         History((Step(START),)).redone()
+
+
+def test_whose_a_pose_is_goes_by_what_led_to_it():
+    log = [
+        Logged("drag", pose_at(1.0).tolist()),
+        Logged("set_pose", pose_at(2.0).tolist(), {"technique": "nudge"}),
+        Logged("set_pose", pose_at(3.0).tolist(), {"technique": "proposal"}),
+        Logged("set_pose", pose_at(3.0).tolist(), {"technique": "mode"}),
+        Logged("snap_applied", pose_at(4.0).tolist()),
+        Logged("accept", pose_at(5.0).tolist()),
+        Logged("reset", START.tolist()),
+    ]
+    history = replay(START, log)
+    posers = [step.posed_by for step in history.steps]
+    assert posers == ["start", "human", "human", "machine", "machine", "machine", "machine", "start"]

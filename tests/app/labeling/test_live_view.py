@@ -11,7 +11,7 @@ from tests.app.waiting import wait_until
 
 def test_the_view_shows_the_ghost_of_what_is_live_until_it_is_taken(services, seat):
     near = pose.perturbed(true_pose(TOOL), 0.012, np.radians(10), np.random.default_rng(3))
-    with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(seat)}/") as client:
+    with ViserClient(services.desk.view_socket(seat)) as client:
         seat.session.set_pose(near, Actor.HUMAN)
         seat.session.set_live(True, Actor.HUMAN)
         live = wait_until(lambda: seat.session.snapshot().live, "a live result")
@@ -31,7 +31,7 @@ def test_the_view_follows_the_session_and_the_session_the_view(services, seat):
         expected = (T_world_object @ T_object_gizmo)[:3, 3]
         return lambda m: m["name"] == "/object" and np.allclose(m["position"], expected, atol=1e-5)
 
-    with ViserClient(f"ws://127.0.0.1:{services.desk.view_port(seat)}/") as client:
+    with ViserClient(services.desk.view_socket(seat)) as client:
         seat.session.set_pose(true_pose(TOOL), Actor.SCRIPT)
         client.wait_for("SetPositionMessage", arrived_at(true_pose(TOOL)))
         dragged = true_pose(TOOL) @ T_object_gizmo @ pose.exp([0, 0, 0, 0, 0, 0.4])

@@ -108,8 +108,7 @@ def test_a_search_passes_by_what_is_known(services, seat, ann):
 
 
 def test_the_view_shows_what_is_done_in_its_colour_until_it_is_hidden(services, seat, ann):
-    port = services.desk.view_port(seat)
-    with ViserClient(f"ws://127.0.0.1:{port}") as client:
+    with ViserClient(services.desk.view_socket(seat)) as client:
         client.node("TransformControlsMessage", "/object")
         block = submitted(services, 2, ann, true_pose(BLOCK))
         mesh = client.node("MeshMessage", "/neighbours/2")
@@ -123,8 +122,7 @@ def test_the_view_shows_what_is_done_in_its_colour_until_it_is_hidden(services, 
 
 
 def test_an_object_that_was_reopened_gets_its_handles_back(services, seat):
-    port = services.desk.view_port(seat)
-    with ViserClient(f"ws://127.0.0.1:{port}") as client:
+    with ViserClient(services.desk.view_socket(seat)) as client:
         client.node("TransformControlsMessage", "/object")
         for act, locked in ((seat.session.submit, True), (seat.session.reopen, False)):
             act(Actor.HUMAN)

@@ -8,6 +8,7 @@ import pytest
 from app.labeling.uncertainty import Uncertainty, UnknownMotion
 from app.labeling.uncertainty_view import lines_of
 from app.labeling.view import DragHandlers, FirstView, SceneView
+from app.outline_mesh import drawable
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import ViserClient
 
@@ -24,17 +25,17 @@ def unsure(semi_axes: list[float], *unknown: UnknownMotion) -> Uncertainty:
 def view() -> Iterator[SceneView]:
     first = FirstView(T_world_camera=NEAR_VIEW, field_of_view=0.8, distance=0.5)
     hands = DragHandlers(lambda: None, lambda T: None, lambda broken: None)
-    opened = SceneView(model_of(mesh_of(TOOL)), np.eye(4), first, hands)
+    opened = SceneView(model_of(mesh_of(TOOL)), np.eye(4), first, hands, drawable)
     yield opened
     opened.close()
 
 
 def connect(view: SceneView) -> ViserClient:
-    return ViserClient(f"ws://127.0.0.1:{view.port}/")
+    return ViserClient(view.socket_path)
 
 
 def test_a_turn_is_an_arc_about_the_axis():
-    segments = lines_of(UnknownMotion("free motion", "turn", AXIS, 0.5), CENTRE, 0.2)
+    segments = lines_of(UnknownMotion("free motion", "turn", AXIS, 0.5, "the z axis"), CENTRE, 0.2)
     axis_line, arc = segments[0], segments[1:-2]
     assert np.allclose(np.cross(axis_line[1] - axis_line[0], AXIS), 0.0)
     assert axis_line.mean(axis=0) == pytest.approx(CENTRE)
@@ -47,8 +48,8 @@ def test_a_turn_is_an_arc_about_the_axis():
 
 
 def test_a_shift_is_a_piece_of_the_axis():
-    free = lines_of(UnknownMotion("free motion", "shift", AXIS, 0.05), CENTRE, 0.2)
-    mode = lines_of(UnknownMotion("other mode", "shift", AXIS, 0.05), CENTRE, 0.2)
+    free = lines_of(UnknownMotion("free motion", "shift", AXIS, 0.05, "the z axis"), CENTRE, 0.2)
+    mode = lines_of(UnknownMotion("other mode", "shift", AXIS, 0.05, "the z axis"), CENTRE, 0.2)
     assert free[1] == pytest.approx(np.array([CENTRE - 0.05 * AXIS, CENTRE + 0.05 * AXIS]))
     assert mode[1] == pytest.approx(np.array([CENTRE, CENTRE + 0.05 * AXIS]))
 
@@ -63,7 +64,7 @@ def test_the_ellipsoid_has_its_size_and_goes_away(view):
 
 
 def test_what_is_as_good_as_a_point_is_not_drawn(view):
-    view.uncertainty.show(unsure([0.0005] * 3, UnknownMotion("free motion", "turn", AXIS, 0.5)))
+    view.uncertainty.show(unsure([0.0005] * 3, UnknownMotion("free motion", "turn", AXIS, 0.5, "the z axis")))
     with connect(view) as client:
         client.node("LineSegmentsMessage", MOTIONS)
         assert not [m for m in client.messages if m.get("name") == ELLIPSOID]
@@ -82,12 +83,15 @@ def test_it_can_be_hidden_without_being_forgotten(view):
     assert not view.uncertainty.visible
 
 
-def test_several_axes_are_numbered_where_they_end(view):
-    turn, shift = (UnknownMotion("free motion", motion, AXIS, 0.05) for motion in ("turn", "shift"))
+def test_several_motions_are_named_where_they_end(view):
+    turn, shift = (
+        UnknownMotion("free motion", motion, AXIS, 0.05, "the z axis") for motion in ("turn", "shift")
+    )
     view.uncertainty.show(unsure([0.0005] * 3, turn, shift))
     with connect(view) as client:
-        for number in (1, 2):
-            label = client.node("LabelMessage", f"/uncertainty/axis-{number}")
-            assert label["props"]["text"] == f"axis {number}"
+        for name in ("arc 1", "line 2"):
+            assert (
+                client.node("LabelMessage", f"/uncertainty/{name.replace(' ', '-')}")["props"]["text"] == name
+            )
         view.uncertainty.show(unsure([0.0005] * 3, turn))
-        client.wait_for("RemoveSceneNodeMessage", lambda message: message["name"] == "/uncertainty/axis-1")
+        client.wait_for("RemoveSceneNodeMessage", lambda message: message["name"] == "/uncertainty/arc-1")

@@ -1,17 +1,23 @@
 """The view over the wire: what a page receives, and what the operator's drags become."""
 
-import socket
+import io
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from app.labeling.camera_watch import CameraWatch
+from app.labeling.cloud_view import COARSE_POINTS, NEAR
 from app.labeling.layers import Layers
-from app.labeling.view import COARSE_POINTS, DragHandlers, FirstView, SceneView
+from app.labeling.view import DragHandlers, FirstView, SceneView
+from app.outline_mesh import MOST_FACES, drawable
+from app.textured_mesh import textured_mesh
 from registration_core import ObjectModel, pose
+from registration_core.mesh_file import plain_ply
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import CAMERA, ViserClient
 from tests.app.waiting import wait_until
@@ -63,7 +69,9 @@ def model() -> ObjectModel:
 
 @pytest.fixture
 def view(hand: Hand, model: ObjectModel) -> Iterator[SceneView]:
-    opened = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end))
+    opened = SceneView(
+        model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end), drawable
+    )
     yield opened
     opened.close()
 
@@ -73,7 +81,7 @@ def rotation_of(wxyz) -> np.ndarray:
 
 
 def connect(view: SceneView) -> ViserClient:
-    return ViserClient(f"ws://127.0.0.1:{view.port}/")
+    return ViserClient(view.socket_path)
 
 
 def gizmo_at(T_world_object: np.ndarray, model: ObjectModel) -> np.ndarray:
@@ -92,6 +100,20 @@ def test_the_mesh_stands_at_the_gizmo(view, model):
         assert 0 < mesh["opacity"] < 1
         position = client.wait_for("SetPositionMessage", lambda m: m["name"] == "/object")["position"]
         assert position == pytest.approx(pose.apply(T_WORLD_OBJECT, model.centre), abs=1e-6)
+
+
+def test_a_dense_mesh_is_drawn_in_few_faces_where_it_is(hand):
+    ring = trimesh.creation.torus(0.08, 0.03, major_sections=400, minor_sections=160)
+    dense = ObjectModel(np.asarray(ring.vertices) + 0.1, np.asarray(ring.faces, np.int32))
+    handlers = DragHandlers(hand.start, hand.move, hand.end)
+    view = SceneView(dense, T_WORLD_OBJECT, FIRST_VIEW, handlers, drawable)
+    with closing(view), connect(view) as client:
+        mesh = client.node("MeshMessage", "/object/mesh")["props"]
+        assert len(mesh["faces"]) // 3 <= MOST_FACES < len(dense.faces)
+        vertices = mesh["vertices"].reshape(-1, 3)
+        for bound in (np.min, np.max):
+            expected = bound(dense.vertices, axis=0) - dense.centre
+            assert bound(vertices, axis=0) == pytest.approx(expected, abs=dense.diameter / 100)
 
 
 def test_the_cloud_arrives_in_full_precision_and_is_replaced(view):
@@ -121,8 +143,49 @@ def test_cloud_and_mesh_are_put_away_and_the_gizmo_stays(view):
         again.node("TransformControlsMessage", "/object")
 
 
+def test_an_object_in_its_own_colours_is_where_its_mesh_is(hand, model):
+    painted = mesh_of(TOOL)
+    painted.visual.vertex_colors = [255, 0, 0, 255]
+    textured = textured_mesh(plain_ply(painted), "ply", None, model)
+    handlers = DragHandlers(hand.start, hand.move, hand.end)
+    view = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, handlers, drawable, textured)
+    with closing(view), connect(view) as client:
+        received = client.node("GlbMessage", "/object/textured")["props"]["glb_data"]
+        scene = trimesh.load_scene(io.BytesIO(received), file_type="glb")
+        assert scene.bounds == pytest.approx(textured.bounds - model.centre, abs=1e-6)
+        (mesh,) = scene.geometry.values()
+        assert np.unique(mesh.visual.vertex_attributes["color"], axis=0).tolist() == [[255, 0, 0, 255]]
+        visibility(client, "/object/mesh", False)
+
+        view.move_object(T_WORLD_OBJECT, "world")
+        turned = T_WORLD_OBJECT[:3, :3]
+        client.wait_for(
+            "SetOrientationMessage",
+            lambda m: m["name"] == "/object/textured" and np.allclose(rotation_of(m["wxyz"]), turned),
+        )
+        for layers, is_textured in (
+            (Layers(texture=False), False),
+            (Layers(), True),
+            (Layers(agreement=True), False),
+        ):
+            client.messages.clear()
+            view.show_layers(layers)
+            visibility(client, "/object/textured", is_textured)
+            visibility(client, "/object/mesh", not is_textured)
+        view.show_layers(Layers())
+        client.messages.clear()
+        view.show_layers(Layers(mesh=False))
+        visibility(client, "/object/textured", False)
+
+
+def visibility(client: ViserClient, name: str, visible: bool) -> None:
+    """Return when the client was told whether a node is to be seen."""
+    client.wait_for("SetSceneNodeVisibilityMessage", lambda m: m["name"] == name and m["visible"] is visible)
+
+
 def test_a_coarse_cloud_has_few_points_that_cover_as_much(view):
-    points = np.random.default_rng(0).uniform(size=(4 * COARSE_POINTS, 3)).astype(np.float32)
+    far_off = 5.0 + np.random.default_rng(0).uniform(size=(4 * COARSE_POINTS, 3))
+    points = far_off.astype(np.float32)
     colors = np.zeros(points.shape, dtype=np.uint8)
     with connect(view) as client:
         view.show_layers(Layers(fine=False))
@@ -132,9 +195,38 @@ def test_a_coarse_cloud_has_few_points_that_cover_as_much(view):
         assert coarse["point_size"] == pytest.approx(0.004)
         assert len(np.unique(shown, axis=0)) == COARSE_POINTS
         assert np.isin(shown[:, 0], points[:, 0]).all()
-        assert shown.mean(axis=0) == pytest.approx([0.5, 0.5, 0.5], abs=0.02)
+        assert shown.mean(axis=0) == pytest.approx([5.5, 5.5, 5.5], abs=0.02)
         view.show_layers(Layers())
         client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == points.size)
+
+
+def test_a_coarse_cloud_is_finer_near_the_object_wherever_that_goes(view, model):
+    centre = pose.apply(T_WORLD_OBJECT, model.centre)
+    reach = NEAR * model.diameter
+    spread = np.random.default_rng(0).uniform(-4, 4, size=(20 * COARSE_POINTS, 3))
+    points = (centre + model.diameter * spread).astype(np.float32)
+    view.show_layers(Layers(fine=False))
+    view.show_cloud(points, np.zeros(points.shape, dtype=np.uint8), point_size=0.002)
+    with connect(view) as client:
+        far, near = (client.node("PointCloudMessage", name)["props"] for name in ("/cloud", "/cloud-near"))
+        places = near["points"].reshape(-1, 3)
+        assert np.linalg.norm(places - centre, axis=1).max() < reach
+        assert np.linalg.norm(far["points"].reshape(-1, 3) - centre, axis=1).min() >= reach - 1e-4
+        assert len(places) + far["points"].size // 3 == COARSE_POINTS
+        assert near["point_size"] == pytest.approx(0.002) and far["point_size"] > 3 * 0.002
+
+        moved = pose.from_rotation_translation(np.eye(3), [2 * model.diameter, 0.0, 0.0]) @ T_WORLD_OBJECT
+        view.move_object(moved)
+        there = pose.apply(moved, model.centre)
+        client.wait_for(
+            "PointCloudMessage",
+            lambda m: (
+                m["name"] == "/cloud-near"
+                and np.linalg.norm(m["props"]["points"].reshape(-1, 3) - there, axis=1).max() < reach
+            ),
+        )
+        view.show_layers(Layers())
+        client.wait_for("RemoveSceneNodeMessage", lambda m: m["name"] == "/cloud-near")
 
 
 def test_points_on_the_object_hang_on_its_mesh_and_are_replaced(view, model):
@@ -298,11 +390,12 @@ def test_a_request_for_a_public_tunnel_is_refused(view, hand, model):
 
 
 def test_a_closed_view_serves_nobody(hand, model):
-    view = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end))
-    port = view.port
+    view = SceneView(
+        model, T_WORLD_OBJECT, FIRST_VIEW, DragHandlers(hand.start, hand.move, hand.end), drawable
+    )
+    folder = view.socket_path.parent
     view.close()
-    with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", port))
+    assert not folder.exists()
 
 
 def test_a_place_that_is_no_number_moves_nothing_and_the_drag_still_ends(view, hand):

@@ -6,6 +6,7 @@ arrays that its messages refer to, each aligned to 8 bytes. To the server: one m
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -15,7 +16,7 @@ import viser
 import zstandard
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from websockets.sync.client import connect
+from websockets.sync.client import connect, unix_connect
 from websockets.typing import Origin, Subprotocol
 
 from tests.app.waiting import LONGEST
@@ -37,11 +38,14 @@ Message = dict[str, Any]
 
 
 class ViserClient:
-    """One connection to a view; what arrives is kept in `messages`."""
+    """One connection to a view, by its address or its socket file; what arrives is kept in `messages`."""
 
-    def __init__(self, url: str, headers: Mapping[str, str] | None = None, origin: str | None = None) -> None:
-        self._socket = connect(
-            url,
+    def __init__(
+        self, view: str | Path, headers: Mapping[str, str] | None = None, origin: str | None = None
+    ) -> None:
+        open_socket = connect if isinstance(view, str) else unix_connect
+        self._socket = open_socket(
+            str(view),
             origin=None if origin is None else Origin(origin),
             subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
             additional_headers=dict(headers or {}),

@@ -59,7 +59,8 @@ def test_an_estimate_that_was_applied_stands_until_the_object_leaves_it():
 
 
 def test_an_offer_outlives_undo():
-    played = recording(moved(2.0, "snap_offered", at(0.1), **SNAPPED), moved(3.0, "undo", START))
+    offered = moved(2.0, "snap_offered", at(0.1), **SNAPPED)
+    played = recording(moved(1.0, "set_pose", at(0.3)), offered, moved(3.0, "undo", START))
     assert confidences_of_ghosts(played, 3.5) == [0.8]
 
 
@@ -76,3 +77,15 @@ def test_the_camera_stands_moves_and_stands_again():
 
 def test_a_log_without_a_camera_has_no_view():
     assert recording().at(0.0).viewpoint is None
+
+
+def test_a_candidate_that_was_taken_is_played_back_as_the_machines():
+    taken = moved(2.0, "set_pose", at(0.1), detail={"technique": "proposal"})
+    played = recording(taken, drag(5.0, 1.0, at(0.1), at(0.2)), moved(6.0, "undo", at(0.1)))
+    assert [played.at(t).posed_by for t in (1.9, 2.0, 3.9, 4.5, 6.0)] == [
+        "start",
+        "machine",
+        "machine",
+        "human",
+        "machine",
+    ]

@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from app.study.plan import StudyPlan, TaskRef, balanced_square, order_of, rows_of_balance
+from app.study.plan import (
+    DECLINED,
+    Question,
+    StudyError,
+    StudyPlan,
+    TaskRef,
+    balanced_square,
+    expected_minutes,
+    order_of,
+    rows_of_balance,
+)
 
 MUG, DRILL, CLAMP = (TaskRef(scene_id=scene, object_id=7) for scene in (1, 2, 3))
 PLAN = StudyPlan(conditions=["manual", "snap"], tasks=[MUG, DRILL], practice=[CLAMP])
@@ -68,6 +78,30 @@ def test_rows_repeat_exactly_and_seeds_differ():
     assert len({tuple(order_of(PLAN, 0, seed)) for seed in range(20)}) > 1
 
 
+def test_the_minutes_are_those_of_all_tasks_with_practice():
+    assert expected_minutes(PLAN) in (14.0, 16.0)  # 4 accurate, 4 quick, 2 for practice in either mode
+    assert expected_minutes(PLAN.model_copy(update={"modes": ["quick"], "practice": []})) == 4.0
+
+
+def test_an_optional_question_offers_to_tell_nothing_and_may_be_left_empty():
+    asked = Question(text="Hand?", choices=["left", "right"], optional=True)
+    assert asked.offered == ["left", "right", DECLINED]
+    assert (asked.checked(" left "), asked.checked(DECLINED), asked.checked(" ")) == ("left", DECLINED, None)
+    with pytest.raises(StudyError, match="choose one of left, right, Rather not say"):
+        asked.checked("both")
+    assert Question(text="Years?", optional=True).offered == []
+    own = Question(text="Hand?", choices=["left", DECLINED], optional=True)
+    assert own.offered == ["left", DECLINED]
+
+
+def test_a_question_of_before_has_to_be_answered_with_its_own_choices():
+    old = Question.model_validate({"text": "Hand?", "choices": ["left", "right"]})
+    assert not old.optional and old.offered == ["left", "right"]
+    for answer, sentence in (("", "please answer 'Hand\\?'"), (DECLINED, "choose one of left, right")):
+        with pytest.raises(StudyError, match=sentence):
+            old.checked(answer)
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
@@ -81,7 +115,7 @@ def test_rows_repeat_exactly_and_seeds_differ():
         ({"groups": {"no\0vice": 1}}, "control character"),
         ({"questions": [{"text": "Hand?", "choices": ["left"]}]}, "left is the only choice"),
         ({"questions": [{"text": "Left\nor right?"}]}, "write one line"),
-        ({"questions": [{"text": "Age?"}, {"text": "Age?"}]}, "asked twice"),
+        ({"questions": [{"text": "Age?"}, {"text": "Age?"}]}, "Age\\? is there twice"),
         ({"tasks": [{"scene_id": s, "object_id": 1} for s in range(1, 400)]}, "would do 1598 tasks"),
         ({"colour": "red"}, "not permitted"),
     ],

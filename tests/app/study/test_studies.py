@@ -5,7 +5,7 @@ from sqlalchemy import func, select
 
 from app.auth import Actor, Auth, SignInError
 from app.event_log import EventLog, NewEvent
-from app.study.plan import StudyError, StudyPlan, order_of
+from app.study.plan import DECLINED, StudyError, StudyPlan, order_of
 from app.tables import Registration, Scene, Task, Trial
 
 
@@ -141,6 +141,22 @@ def test_answers_are_those_that_are_asked_for(studies, study):
             studies.answer(participant.id, answers)
     studies.answer(participant.id, {question: " yes "})
     assert studies.progress(study.id)[0].participant.answers == {question: "yes"}
+
+
+def test_what_is_left_empty_is_kept_apart_from_what_is_not_told(studies, plan, admin):
+    hand, years = (
+        {"text": "Hand?", "choices": ["left", "right"], "optional": True},
+        {"text": "Years?", "optional": True},
+    )
+    asking = StudyPlan.model_validate(plan.model_dump() | {"questions": [hand, years]})
+    study = studies.create("asking", asking, 7, admin.id)
+    for group, answers, kept in (
+        ("novice", {"Hand?": DECLINED, "Years?": " "}, {"Hand?": DECLINED, "Years?": None}),
+        ("expert", {}, {"Hand?": None, "Years?": None}),
+    ):
+        participant = studies.add_participant(study.id, group).participant
+        studies.answer(participant.id, answers)
+        assert studies.progress(study.id)[-1].participant.answers == kept
 
 
 def test_nobody_is_asked_before_they_agreed(studies, plan, admin):

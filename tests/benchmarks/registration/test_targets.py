@@ -42,6 +42,13 @@ def test_successes(found: dict[str, Figure]) -> None:
     assert found["the same from 2 cm/15°, share of that"].value == 90.0
 
 
+def test_truths_that_the_depth_does_not_show() -> None:
+    of_moro = [replace(trial(SHELLS[0], 0, DEFAULT, RIGHT, 0.02, 0.9), set_name=MORO)]
+    results = [InstanceTrials(of_moro, error) for error in (RIGHT, RIGHT, RIGHT, WRONG)]
+    found = {figure.name: figure.value for figure in figures(results)}
+    assert found["moro, the truth, polished on the depth, has an MSSD >= 5 %, of all"] == 25.0
+
+
 def test_good_poses_made_worse(found: dict[str, Figure]) -> None:
     assert found["at least half visible, default, good poses made worse"].value == 25.0
     told = found["at least half visible, default, spread told, good poses made worse"]

@@ -1,0 +1,26 @@
+/**
+ * The ring of the focus around the 3-D view. No style sheet can tell that an iframe has the focus, nor whether it
+ * came by a key.
+ */
+
+import { byId } from "../dom.js";
+
+/** A part of the labelling page. */
+export function viewRingPart() {
+  let byKey = false;
+  follow(window);
+  for (const change of ["blur", "focus"]) addEventListener(change, show);
+
+  function follow(target) {
+    const capture = { capture: true };
+    target.addEventListener("keydown", () => (byKey = true), capture);
+    target.addEventListener("pointerdown", () => ((byKey = false), show()), capture);
+  }
+
+  function show() {
+    const view = byId("view");
+    view?.parentElement.classList.toggle("ringed", byKey && document.activeElement === view);
+  }
+
+  return { attach: follow };
+}

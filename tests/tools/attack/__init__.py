@@ -1,0 +1,1 @@
+"""Attacks by kinds on a running server, over the loopback alone: `./scripts/attack`."""
