@@ -85,7 +85,7 @@ class Database:
     def migrate(self) -> None:
         """Bring the tables up to this version; nothing happens where they are."""
         config = _alembic_config()
-        with self.engine.execution_options(snap6d_write=True).begin() as connection:
+        with self._migrating() as connection:
             found = MigrationContext.configure(connection).get_current_revision()
             if found is not None and found not in _known_revisions():
                 raise DatabaseError(
@@ -93,6 +93,27 @@ class Database:
                 )
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
+
+    @contextmanager
+    def _migrating(self) -> Iterator[Connection]:
+        """A transaction that changes tables, all or nothing.
+
+        SQLite copies a table to change it, and what refers to it must not mind; all references are checked
+        before the transaction ends.
+        """
+        with self.engine.execution_options(snap6d_write=True).connect() as connection:
+            if self._is_sqlite:
+                _set_foreign_keys(connection, "OFF")
+            try:
+                with connection.begin():
+                    yield connection
+                    if self._is_sqlite and connection.exec_driver_sql("PRAGMA foreign_key_check").first():
+                        raise DatabaseError(
+                            "the database has rows that refer to missing ones; restore a backup of it"
+                        )
+            finally:
+                if self._is_sqlite:
+                    _set_foreign_keys(connection, "ON")
 
     @contextmanager
     def kept_to_one_server(self) -> Iterator[None]:
@@ -138,6 +159,13 @@ def _set_sqlite_pragmas(connection: Any, _record: Any) -> None:
     # Without recursive triggers, INSERT OR REPLACE would slip past those that keep the log append-only.
     for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "recursive_triggers=ON"):
         connection.execute(f"PRAGMA {pragma}")
+
+
+def _set_foreign_keys(connection: Connection, value: str) -> None:
+    # on the driver's connection: SQLite ignores it within a transaction, which SQLAlchemy would begin
+    driver_connection = connection.connection.driver_connection
+    assert driver_connection is not None
+    driver_connection.execute(f"PRAGMA foreign_keys={value}")
 
 
 def _begin_sqlite(connection: Connection) -> None:

@@ -173,5 +173,6 @@ def _close(services: Services) -> None:
     services.export_jobs.close()
     services.preparation.close()
     services.snapper.close()
+    services.preparation.join()
     services.auth.close()
     services.database.close()

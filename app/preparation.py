@@ -22,6 +22,9 @@ KNOWN_AHEAD = worker.KEPT_OBJECTS // 2
 """The newest objects, which workers know before anybody opens a task; the other half of what they keep is for
 those that somebody does open."""
 
+SECONDS_TO_END = 30
+"""That its end is waited for, at most; it ends when it is done with the object that it is at."""
+
 Key = tuple[str, str, str]
 """All that what is built of an object depends on, as its row has it."""
 
@@ -74,6 +77,11 @@ class Preparation:
         """Take up nothing more. What workers are at ends with the snapper."""
         self._closed = True
         self._wanted.set()
+
+    def join(self) -> None:
+        """Wait until it has ended, after it and the snapper were closed: it is in the database no more."""
+        if self._thread.is_alive():
+            self._thread.join(SECONDS_TO_END)
 
     def _run(self) -> None:
         try:

@@ -270,7 +270,9 @@ class Registration(Base):
     """One operator's work on one task: whose it is and how it ended. What happened is in its events."""
 
     __tablename__ = "registrations"
-    __table_args__ = (UniqueConstraint("task_id", "user_id"),)
+    # SQLite would give the number of an erased registration to the next one, under which pages, logs and
+    # exports of before still know the erased.
+    __table_args__ = (UniqueConstraint("task_id", "user_id"), {"sqlite_autoincrement": True})
     id: Mapped[int] = mapped_column(primary_key=True)
     task_id: Mapped[int] = mapped_column(ForeignKey("tasks.id"))
     user_id: Mapped[int] = mapped_column(ForeignKey("users.id"))

@@ -220,6 +220,7 @@ def erase_participant(study_id: Id, participant_id: Id, services: ServicesDep, _
     services.studies.withdraw(participant_id)
     services.desk.leave(participant.user_id)  # before erasing: closing a session may still write
     services.studies.erase(participant_id)
+    services.desk.leave(participant.user_id)  # one that a request on its way had opened again
 
 
 def _study(services: Services, study_id: int) -> Study:

@@ -12,7 +12,7 @@ from sqlalchemy import select
 
 from app.auth import Identity, Role
 from app.database import Database
-from app.event_log import STATE_AFTER, EventLog, NewEvent
+from app.event_log import STATE_AFTER, ErasedError, EventLog, NewEvent
 from app.labeling.depth_reading import DepthReading, DepthView
 from app.labeling.dispatch import Dispatch
 from app.labeling.history import replay
@@ -286,6 +286,8 @@ class Desk:
 def _close(seat: Seat) -> None:
     try:
         seat.close()
+    except ErasedError:
+        pass  # nor is anything of it to be written down
     except Exception:  # the disk is full, perhaps: the others are closed all the same
         logger.exception("registration %d: the end of its session was not written down", seat.registration.id)
 

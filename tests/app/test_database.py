@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from alembic.script import ScriptDirectory
 from sqlalchemy import delete, func, select, text, update
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, IntegrityError
 
 import app.database
 from app.auth import Actor
@@ -263,9 +263,20 @@ def first_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Database:
         database = Database(f"sqlite:///{tmp_path / 'first.sqlite'}")
         database.migrate()
     with sqlite3.connect(path_of(database)) as connection:  # which does not check references
-        columns = connection.execute("PRAGMA table_info(estimates)").fetchall()
-        values = ", ".join({"JSON": "'[]'", "DATETIME": "'2026-01-01'"}.get(row[2], "1") for row in columns)
-        connection.execute(f"INSERT INTO estimates VALUES ({values})")
+        for table in (
+            "users",
+            "datasets",
+            "objects",
+            "scenes",
+            "frames",
+            "tasks",
+            "registrations",
+            "estimates",
+        ):
+            columns = connection.execute(f"PRAGMA table_info({table})").fetchall()
+            values = {"JSON": "'[]'", "DATETIME": "'2026-01-01'"}
+            row = ", ".join(values.get(column[2], "1") for column in columns)
+            connection.execute(f"INSERT INTO {table} VALUES ({row})")
     connection.close()
     return database
 
@@ -281,6 +292,31 @@ def test_estimates_of_the_first_version_stay_as_they_are_and_say_no_more(first_v
     for statement in (update(EstimateRow).values(start_spread=[0.1, 0.1]), delete(EstimateRow)):
         with pytest.raises(DBAPIError, match="append-only"), first_version.write() as session:
             session.execute(statement)
+    first_version.close()
+
+
+def test_what_a_copied_table_is_referred_to_by_still_refers_to_it(first_version):
+    first_version.migrate()
+    with pytest.raises(IntegrityError), first_version.write() as session:
+        session.execute(text("DELETE FROM registrations"))
+    with pytest.raises(IntegrityError), first_version.write() as session:
+        session.execute(
+            text(
+                "INSERT INTO registrations SELECT 9, 8, user_id, state, T_world_object,"
+                " created_at, submitted_at, skip_reason FROM registrations"
+            )
+        )
+    first_version.close()
+
+
+def test_rows_that_refer_to_none_end_a_migration(first_version):
+    with sqlite3.connect(path_of(first_version)) as connection:
+        connection.execute("DELETE FROM registrations")
+    connection.close()
+    with pytest.raises(DatabaseError, match="refer to missing ones; restore a backup"):
+        first_version.migrate()
+    with pytest.raises(DatabaseError, match="older Snap6D"):
+        first_version.check_version()
     first_version.close()
 
 

@@ -1,5 +1,6 @@
 """The objects of all datasets are built in the background, on real workers."""
 
+import threading
 from collections.abc import Iterator
 from contextlib import closing
 
@@ -13,7 +14,7 @@ from app.scene_data import symmetries_to_json
 from app.services import Services
 from app.symmetries import decide, suggestions_of
 from app.tables import Object, SymmetrySuggestions
-from registration_core import Symmetries, SymmetryAxis
+from registration_core import ObjectModel, Symmetries, SymmetryAxis
 from registration_core.object_model import ContinuousSymmetry
 from tests.app.small_dataset import BLOCK, TOOL
 from tests.app.test_importing import THREAD_MESH
@@ -122,3 +123,23 @@ def test_an_object_whose_file_is_damaged_says_so_until_it_is_mended(services, pr
     preparation.look()
     wait_until_prepared(services)
     assert preparation.problem(item) is None
+
+
+def test_a_server_that_ends_leaves_nobody_in_the_database(services, preparation, monkeypatch):
+    before = threading.enumerate()
+    inside, ended = threading.Event(), threading.Event()
+    model_of = services.data.model
+
+    def slow_model(item: Object) -> ObjectModel:
+        inside.set()
+        assert ended.wait(30)
+        return model_of(item)
+
+    monkeypatch.setattr(services.data, "model", slow_model)
+    preparation.start()
+    assert inside.wait(30)
+    preparation.close()
+    services.snapper.close()
+    ended.set()
+    preparation.join()
+    assert "preparation" not in [thread.name for thread in threading.enumerate() if thread not in before]

@@ -19,13 +19,14 @@ BROKEN_WORDS = """() => {
         const range = document.createRange();
         range.setStart(texts.currentNode, word.index);
         range.setEnd(texts.currentNode, word.index + word[0].length);
-        if (new Set([...range.getClientRects()].map(({ top }) => top)).size > 1) broken.push(word[0]);
+        const lines = new Set([...range.getClientRects()].map(({ top }) => top));
+        if (lines.size > 1 && word[0].length <= 20) broken.push(word[0]);
       }
     }
   }
   return broken;
 }"""
-"""Of tables: those that go on in a second line."""
+"""Of tables: those that go on in a second line, but for names too long for a column."""
 WIDER = "document.documentElement.scrollWidth > document.documentElement.clientWidth"
 
 

@@ -56,6 +56,21 @@ def test_all_of_one_user_goes_and_all_of_another_stays(database):
 
 
 @pytest.mark.usefixtures("studies")
+def test_the_number_of_the_erased_is_not_given_again(database):
+    """Pages, logs and exports of before still know the erased under it."""
+
+    def registration_of(user_id):
+        with database.read() as session:
+            return session.scalar(select(Registration.id).filter_by(user_id=user_id))
+
+    gone = work_of(database, "gone")
+    number = registration_of(gone)
+    with database.write() as session:
+        erase_registrations(session, gone)
+    assert registration_of(work_of(database, "next")) > number
+
+
+@pytest.mark.usefixtures("studies")
 @pytest.mark.parametrize("interrupted", [False, True])
 def test_the_log_is_append_only_afterwards(database, interrupted):
     gone, _ = work_of(database, "gone"), work_of(database, "kept")
