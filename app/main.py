@@ -8,7 +8,9 @@ from collections.abc import AsyncIterator
 from fastapi import FastAPI
 
 from app import __version__, pages
-from app.analysis.kept import Kept
+from app.access.auth import Auth
+from app.access.throttle import Throttle
+from app.analysis.report.report_cache import ReportCache
 from app.api import (
     body_limits,
     copies,
@@ -23,6 +25,7 @@ from app.api import (
     registration_stream,
     registrations,
     replay,
+    replay_proxy,
     reports,
     scene_things,
     scenes,
@@ -35,26 +38,23 @@ from app.api import (
     team_reports,
     three_points,
     uncertainty,
+    view_proxy,
 )
-from app.auth import Auth
+from app.confidence.standards import Standards
 from app.config import Settings
-from app.database import Database
-from app.event_log import EventLog
-from app.export_jobs import ExportJobs
-from app.labeling import proxy
-from app.labeling.desk import Desk
-from app.memory import give_back
-from app.preparation import Preparation
-from app.replay import proxy as replay_proxy
+from app.datasets.scene_data import SceneData
+from app.export.processes import ExportJobs
+from app.labeling.live.sessions import LiveSessions
 from app.replay.replays import Replays
-from app.scene_data import SceneData
 from app.services import Services
-from app.snapping import Snapper, create_snapper
-from app.standards import Standards
-from app.stored_files import open_store
+from app.serving.memory import give_back
+from app.storage.database import Database
+from app.storage.event_log import EventLog
+from app.storage.named_files import open_store
+from app.storage.unfinished import clear_unfinished
 from app.study.studies import Studies
-from app.throttle import Throttle
-from app.unfinished import clear_unfinished
+from app.workers.pool import Snapper, create_snapper
+from app.workers.preparation import Preparation
 
 logger = logging.getLogger(__name__)
 
@@ -84,10 +84,10 @@ def create_services(settings: Settings, snapper: Snapper | None = None) -> Servi
         snapper=snapper,
         preparation=Preparation(database, data, snapper),
         standards=standards,
-        desk=Desk(database, log, data, snapper, standards),
+        live_sessions=LiveSessions(database, log, data, snapper, standards),
         replays=Replays(database, log, data),
         export_jobs=ExportJobs(database, settings),
-        kept=Kept(database),
+        kept=ReportCache(database),
         studies=Studies(database, data),
     )
 
@@ -146,7 +146,7 @@ def create_app(services: Services) -> FastAPI:
     ):
         app.include_router(module.router)
     app.include_router(replay_proxy.router)
-    app.include_router(proxy.router)
+    app.include_router(view_proxy.router)
     pages.install(app)
     return app
 
@@ -156,7 +156,7 @@ async def _clean_up(services: Services) -> None:
     while True:
         await asyncio.sleep(SECONDS_BETWEEN_CLEANINGS)
         closed = 0
-        for close_idle in (services.desk.close_idle, services.replays.close_idle):
+        for close_idle in (services.live_sessions.close_idle, services.replays.close_idle):
             try:
                 closed += await asyncio.to_thread(close_idle)
             except Exception:  # the next time is soon
@@ -168,7 +168,7 @@ async def _clean_up(services: Services) -> None:
 
 
 def _close(services: Services) -> None:
-    services.desk.close()
+    services.live_sessions.close()
     services.replays.close()
     services.export_jobs.close()
     services.preparation.close()

@@ -9,9 +9,9 @@ from starlette.middleware.base import RequestResponseEndpoint
 
 from app.api.dependencies import get_services, identify
 from app.api.problems import http_error
-from app.auth import Role
 from app.config import PROJECT
-from app.tables import Base, Object, Registration, Study, Task
+from app.storage.roles import Role
+from app.storage.tables import Base, Object, Registration, Study, Task
 
 STATIC = PROJECT / "static"
 CONTENT_SECURITY_POLICY = (

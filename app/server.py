@@ -8,18 +8,19 @@ import rich
 import uvicorn
 from sqlalchemy import select
 
-from app.auth import LOCAL_ADMINISTRATOR, Role
+from app.access.auth import LOCAL_ADMINISTRATOR
 from app.config import PROJECT, Settings
-from app.connections import server_config
-from app.database import Database
-from app.importing import import_dataset
-from app.listening import ServeError, sign_in_link
+from app.datasets.importing import import_dataset
 from app.main import create_app, create_services
-from app.memory import keep_large_blocks_apart
 from app.services import Services
-from app.snapping import Snapper
-from app.storage import FileStore
-from app.tables import Dataset
+from app.serving.connections import server_config
+from app.serving.listening import ServeError, sign_in_link
+from app.serving.memory import keep_large_blocks_apart
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.roles import Role
+from app.storage.tables import Dataset
+from app.workers.pool import Snapper
 
 DEMO_SCENES = PROJECT / "scenes" / "demo"
 SECONDS_TO_FINISH = 3

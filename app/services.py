@@ -2,20 +2,20 @@
 
 from dataclasses import dataclass
 
-from app.analysis.kept import Kept
-from app.auth import Auth
+from app.access.auth import Auth
+from app.analysis.report.report_cache import ReportCache
+from app.confidence.standards import Standards
 from app.config import Settings
-from app.database import Database
-from app.event_log import EventLog
-from app.export_jobs import ExportJobs
-from app.labeling.desk import Desk
-from app.preparation import Preparation
+from app.datasets.scene_data import SceneData
+from app.export.processes import ExportJobs
+from app.labeling.live.sessions import LiveSessions
 from app.replay.replays import Replays
-from app.scene_data import SceneData
-from app.snapping import Snapper
-from app.standards import Standards
-from app.storage import FileStore
+from app.storage.database import Database
+from app.storage.event_log import EventLog
+from app.storage.files import FileStore
 from app.study.studies import Studies
+from app.workers.pool import Snapper
+from app.workers.preparation import Preparation
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Services:
     snapper: Snapper
     preparation: Preparation
     standards: Standards
-    desk: Desk
+    live_sessions: LiveSessions
     replays: Replays
     export_jobs: ExportJobs
-    kept: Kept
+    kept: ReportCache
     studies: Studies

@@ -12,8 +12,8 @@ from benchmarks.registration.instances import HALF, HIDDEN, Instance, synthetic_
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.starts import FAR, MIDDLE, Shell, starts
 from registration_core import SnapConfig, snap, warm_up
-from registration_core.evidence import BELOW, RING
-from registration_core.snap_config import RoundConfig, StageConfig
+from registration_core.config import RoundConfig, StageConfig
+from registration_core.judge.pixel_evidence import BELOW, RING
 
 TITLE = "Ablation: ADD(-S) < 10 % on synthetic scenes, from 5 cm/30° and 10 cm/60° together"
 

@@ -9,15 +9,16 @@ import httpx
 import numpy as np
 from scipy.ndimage import binary_erosion
 
-from app.scene_data import camera_of
-from app.study.hand import CLICK, CLOSE, DECIDE, KEY, next_stroke
+from app.datasets.scene_data import camera_of
+from app.study.simulated.motor_model import CLICK, CLOSE, DECIDE, KEY, next_stroke
 from benchmarks.operators import ENDED, Operator, Stream
 from benchmarks.registration.judging import Judge
 from benchmarks.scenes import KnownTask
 from benchmarks.viser_client import Array, ViewClient
-from registration_core import ObjectModel, pose
-from registration_core.camera import depth_to_points, project
-from registration_core.rasterizer import render_depth
+from registration_core import ObjectModel
+from registration_core.geometry import pose
+from registration_core.geometry.camera import depth_to_points, project
+from registration_core.rendering.rasterizer import render_depth
 
 NEAR = np.array([0.08, np.radians(40.0)])
 """Metres and radians from which an operator trusts a snap to do the rest."""

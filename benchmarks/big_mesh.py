@@ -11,7 +11,7 @@ from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import write_full_frames
 from benchmarks.server import RunningServer, prepare_state, running_server
-from registration_core.procedural_objects import ProceduralObject
+from registration_core.synthetic.objects import ProceduralObject
 
 TITLE = "A mesh of a million faces, and another operator's requests meanwhile"
 OPEN_TARGET = Target(5.0)

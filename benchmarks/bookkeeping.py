@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sqlalchemy import select
 
-from app.database import Database
-from app.tables import EstimateRow, Event
+from app.storage.database import Database
+from app.storage.tables import EstimateRow, Event
 
 Array = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
 from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
 from benchmarks.viser_client import ViewClient
-from registration_core import pose
+from registration_core.geometry import pose
 from tests.e2e.conftest import CHROMIUM, CHROMIUM_ARGUMENTS, SHOWN_AROUND
 
 Array = NDArray[np.float64]

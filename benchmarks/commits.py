@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 from sqlalchemy import func, select
 
-from app.auth import Actor, Auth, Role
-from app.database import Database
-from app.event_log import EventLog, NewEvent
-from app.tables import Event, Registration
+from app.access.auth import Auth
+from app.storage.database import Database
+from app.storage.event_log import EventLog, NewEvent
+from app.storage.roles import Actor, Role
+from app.storage.tables import Event, Registration
 from benchmarks.figures import Figure, Target
 from benchmarks.scenes import known_tasks
 from benchmarks.server import DEMO_SCENES, database_of, prepare_state

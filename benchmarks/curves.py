@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from sqlalchemy import insert, update
 from sqlalchemy.orm import Session
 
-from app.analysis.report import study_report
-from app.auth import Auth, Role
-from app.database import Database
-from app.tables import Event, Participant, Registration, Study, Task, Trial, User, utc_now
+from app.access.auth import Auth
+from app.analysis.report.report import study_report
+from app.storage.database import Database
+from app.storage.roles import Role
+from app.storage.tables import Event, Participant, Registration, Study, Task, Trial, User, utc_now
 from benchmarks.figures import Figure, Target
 from benchmarks.scenes import known_tasks
 from benchmarks.server import DEMO_SCENES, database_of, prepare_state
-from registration_core import pose
+from registration_core.geometry import pose
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ SECONDS_BETWEEN_CLEANINGS = 1.0
 def main() -> None:
     """Run the command line with shorter periods."""
     import app.main
-    from app import cli
-    from app.labeling.desk import Desk
+    from app.cli import commands as cli
+    from app.labeling.live.sessions import LiveSessions
 
     app.main.SECONDS_BETWEEN_CLEANINGS = SECONDS_BETWEEN_CLEANINGS
-    Desk.close_idle.__defaults__ = (IDLE_SECONDS,)
+    LiveSessions.close_idle.__defaults__ = (IDLE_SECONDS,)
     cli.main()
 
 

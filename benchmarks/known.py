@@ -13,8 +13,9 @@ from benchmarks.registration.instances import HALF, HIDDEN, RECIPES
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.objects import known_objects
 from benchmarks.registration.starts import SHELLS, Shell, is_in_view, starts
-from registration_core import Intrinsics, ObjectModel, explained_pixels, pose, snap, warm_up
-from registration_core.synthetic_scene import make_scene
+from registration_core import Intrinsics, ObjectModel, explained_pixels, snap, warm_up
+from registration_core.geometry import pose
+from registration_core.synthetic.scene import make_scene
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from benchmarks.operators import Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
 from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
 from benchmarks.viser_client import Array, ViewClient
-from registration_core import pose
+from registration_core.geometry import pose
 
 TITLE = "Live snap in drags of the demo objects, one operator"
 LATENCY_TARGET = Target(0.150)

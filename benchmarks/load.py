@@ -15,7 +15,7 @@ from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
 from benchmarks.server import DEMO_SCENES, RunningServer, database_of, prepare_state, running_server
 from benchmarks.viser_client import ViewClient
-from registration_core import pose
+from registration_core.geometry import pose
 
 TITLE = "Load: operators who drag (20 updates a second for a second) and snap, each with a page open"
 NOTHING = Target(0.0)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sqlalchemy import select
 
-from app.tables import Frame, Object, Registration, Scene, Task, User
+from app.storage.tables import Frame, Object, Registration, Scene, Task, User
 from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.server import DEMO_SCENES, RunningServer, database_of, prepare_state, running_server

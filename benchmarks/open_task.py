@@ -5,7 +5,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.scene_data import CLOUD_POINTS
+from app.datasets.scene_data import CLOUD_POINTS
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import known_tasks, write_full_frames

@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
-from app.scene_data import SceneData
-from app.storage import FileStore
-from app.tables import Frame, Scene, Task
+from app.datasets.scene_data import SceneData
+from app.storage.files import FileStore
+from app.storage.tables import Frame, Scene, Task
 from benchmarks.server import database_of, settings_of
-from registration_core import ObjectModel, bop_writer, pose
-from registration_core.procedural_objects import ProceduralObject, demo_objects
-from registration_core.rasterizer import render_depth
-from registration_core.synthetic_scene import CAMERA
+from registration_core import ObjectModel
+from registration_core.bop import writer as bop_writer
+from registration_core.geometry import pose
+from registration_core.rendering.rasterizer import render_depth
+from registration_core.synthetic.objects import ProceduralObject, demo_objects
+from registration_core.synthetic.scene import CAMERA
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,14 @@ from pathlib import Path
 import httpx
 import psutil
 
-from app.auth import Auth, Role
+from app.access.auth import Auth
 from app.config import PROJECT, Settings
-from app.database import Database
-from app.importing import import_dataset
-from app.storage import FileStore
+from app.datasets.importing import import_dataset
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.roles import Role
 
-SERVE = (sys.executable, "-m", "app.cli", "serve")
+SERVE = (sys.executable, "-m", "app.cli.commands", "serve")
 DEMO_SCENES = PROJECT / "scenes" / "demo"
 SECONDS_TO_START = 180.0
 SECONDS_TO_STOP = 30.0

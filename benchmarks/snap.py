@@ -11,7 +11,7 @@ from benchmarks.figures import Figure, Target, percentile, spread
 from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
 from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
-from registration_core import pose_error
+from registration_core.geometry import pose_error
 
 TITLE = "Snap on the demo scenes: from POST .../snaps to the result on the stream"
 TARGET = Target(0.15)

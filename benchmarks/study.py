@@ -105,7 +105,7 @@ def _watched(state: Path, *arguments: str) -> list[Look]:
     began = time.perf_counter()
     with output.open("wb") as sink, closing(sqlite3.connect(state / "snap6d.sqlite")) as database:
         process = psutil.Popen(
-            [sys.executable, "-m", "app.cli", "study", *arguments],
+            [sys.executable, "-m", "app.cli.commands", "study", *arguments],
             cwd=PROJECT,
             env={**os.environ, "SNAP6D_STATE_DIR": str(state)},
             stdin=subprocess.DEVNULL,

@@ -13,7 +13,7 @@ from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.registration.objects import DATA, ycb_object
 from benchmarks.scenes import KnownTask, known_tasks
 from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
-from registration_core import pose
+from registration_core.geometry import pose
 
 TITLE = "Aligning an object within 5 mm and 5°, from 20 cm and 45° off: a scripted operator"
 

@@ -12,7 +12,7 @@ import websockets
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from registration_core import pose
+from registration_core.geometry import pose
 from tests.app.labeling.viser_client import CAMERA, GIZMO, decoded
 
 Array = NDArray[np.float64]

@@ -1,8 +1,8 @@
-"""How alembic reaches the database: through the connection that `app.database` hands over."""
+"""How alembic reaches the database: through the connection that `app.storage.database` hands over."""
 
 from alembic import context
 
-from app.tables import Base
+from app.storage.tables import Base
 
 connection = context.config.attributes.get("connection")
 if connection is None:

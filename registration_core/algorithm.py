@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = "registration_core"
-ENTRIES = ("snap", "views", "global_search", "known_objects")
+ENTRIES = ("snap", "snap_views", "propose", "rendering.known_objects")
 """The modules whose functions make results; what they import follows from them."""
 FITTED = "fitted.json"
 DIGITS = 12
@@ -100,5 +100,5 @@ def _is_docstring(node: object) -> bool:
 ALGORITHM = algorithm_of(Path(__file__).parent)
 """Of this installation; 12 hexadecimal digits."""
 
-VIEWPOINT_ALGORITHM = sources_hash(Path(__file__).parent, ("viewpoint_model",))
+VIEWPOINT_ALGORITHM = sources_hash(Path(__file__).parent, ("search.viewpoint_model",))
 """The same of what is built of an object before it is looked for, which changes less often."""

@@ -3,15 +3,15 @@
 import numpy as np
 import trimesh
 
-from registration_core import pose
-from registration_core.camera import Intrinsics
-from registration_core.global_search import propose
-from registration_core.kernels import f4
-from registration_core.object_model import ObjectModel, discrete
-from registration_core.rasterizer import render_depth
+from registration_core.config import AnywhereConfig, ParticleFilterConfig, RoundConfig, SnapConfig
+from registration_core.geometry import pose
+from registration_core.geometry.camera import Intrinsics
+from registration_core.geometry.kernels import f4
+from registration_core.geometry.object_model import ObjectModel, discrete
+from registration_core.propose import propose
+from registration_core.rendering.rasterizer import render_depth
 from registration_core.snap import snap
-from registration_core.snap_config import AnywhereConfig, ParticleFilterConfig, RoundConfig, SnapConfig
-from registration_core.views import snap_views
+from registration_core.snap_views import snap_views
 
 
 def warm_up() -> None:

@@ -1,13 +1,13 @@
 """What a snap returns."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.algorithm import ALGORITHM
-from registration_core.certificates import Certificates
+from registration_core.judge.ambiguity import Ambiguity
+from registration_core.judge.certificates import Certificates
 
 Array = NDArray[np.float64]
 
@@ -23,19 +23,6 @@ class Hypothesis:
     chance: float | None = None
     """Probability in [0, 1] that the object is there, MSSD below 5 % of the diameter, however few others
     there are; None where nobody asked, since of a snap's first hypothesis the confidence says it."""
-
-
-@dataclass(frozen=True)
-class Ambiguity:
-    """Something about a pose that the depth does not tell."""
-
-    kind: Literal["other mode", "free motion"]
-    """Another mode of like weight, or a motion that changes nothing that is seen."""
-    motion: Literal["turn", "shift"]
-    axis: tuple[float, ...]
-    """(3,), direction in the mesh frame: about which the object could be turned, or along which shifted."""
-    extent: float
-    """Radians or metres: how far off the other mode is, or the standard deviation of the free motion."""
 
 
 @dataclass(frozen=True, eq=False)

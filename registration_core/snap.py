@@ -12,19 +12,19 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from registration_core.camera import Intrinsics
-from registration_core.confidence import confidence
+from registration_core.config import SnapConfig
 from registration_core.estimate import Estimate, SnapStep
-from registration_core.kernels import to_rows
-from registration_core.likelihood import RenderedLikelihood
-from registration_core.particle_filter import Noise, ParticleFilter, initial_poses
-from registration_core.problem import checked_problem
-from registration_core.search import search_of
+from registration_core.geometry.camera import Intrinsics
+from registration_core.geometry.kernels import to_rows
+from registration_core.judge.confidence import confidence
+from registration_core.paper.likelihood import RenderedLikelihood
+from registration_core.paper.particle_filter import Noise, ParticleFilter, initial_poses
+from registration_core.search.snap_input import checked_problem
+from registration_core.search.viewpoint_model import Registrable
 from registration_core.seeding import seed_of
-from registration_core.snap_config import SnapConfig
 from registration_core.snap_run import Sighting, SnapRun
 from registration_core.verdict import judged, nothing_seen, outcome, progress, standing, verdict
-from registration_core.viewpoint_model import Registrable
+from registration_core.view_search import search_of
 
 
 def snap(

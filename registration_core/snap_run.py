@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from registration_core import pose, selection
-from registration_core.camera import Intrinsics
-from registration_core.certificates import Check, checked_by
-from registration_core.kernels import Array32, from_rows, to_rows
-from registration_core.modes import distinct, move_to_nearest_twin
-from registration_core.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
-from registration_core.precision import surface_spreads
-from registration_core.problem import Problem
-from registration_core.search import Search
-from registration_core.selection import Judgement
+from registration_core.geometry import pose
+from registration_core.geometry.camera import Intrinsics
+from registration_core.geometry.kernels import Array32, from_rows, to_rows
+from registration_core.judge import selection
+from registration_core.judge.certificates import Check, checked_by
+from registration_core.judge.precision import surface_spreads
+from registration_core.judge.selection import Judgement
+from registration_core.search.modes import distinct, move_to_nearest_twin
+from registration_core.search.polish import DAMPING, FINAL_TUKEY, MAX_STEP, MIN_WEIGHT
+from registration_core.search.snap_input import SnapInput
+from registration_core.view_search import ViewSearch
 
 Array = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ JOINT_ITERATIONS, JOINT_TUKEY = 10, (0.015, 0.004)
 class Sighting:
     """A view that shows the object, and the search in it."""
 
-    search: Search
+    search: ViewSearch
     T_camera_first: Array
     """(4, 4), from the axes of the first view's camera."""
 
@@ -51,7 +52,7 @@ class Sighting:
         return to_rows(pose.inverse(self.T_camera_first) @ from_rows(poses))
 
     def systems(self, poses: Array32, tukey: float) -> tuple[Array, Array, Array]:
-        """`Search.systems` of poses (N, 3, 4) in the first camera, in its axes."""
+        """`ViewSearch.systems` of poses (N, 3, 4) in the first camera, in its axes."""
         hessians, sides, weights = self.search.systems(self.seen(poses), tukey)
         return self._to_first @ hessians @ self._to_first.T, sides @ self._to_first.T, weights
 
@@ -88,7 +89,7 @@ class SnapRun:
     witnesses: tuple[Witness, ...] = ()
 
     @property
-    def problem(self) -> Problem:
+    def problem(self) -> SnapInput:
         """What is sought and from where, in the first camera."""
         return self.sightings[0].search.problem
 
@@ -103,7 +104,7 @@ class SnapRun:
         return np.concatenate([self._polished(start, NEAR_ITERATIONS, tukey) for tukey in NEAR_TUKEY])
 
     def round(self, share: float, widening: float) -> Iterator[Array32]:
-        """`Search.round` in every view, side by side; what all stages leave is polished by all views."""
+        """`ViewSearch.round` in every view, side by side; what all stages leave is polished by all views."""
         if len(self.sightings) == 1:
             yield from self.sightings[0].search.round(share, widening)
             return

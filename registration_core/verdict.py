@@ -6,18 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core.agreement import heavy_tails
-from registration_core.ambiguity import ambiguities
-from registration_core.certificates import certified
-from registration_core.confidence import Modes, belief_in_first, confidence, grouped
 from registration_core.estimate import Estimate, Hypothesis, SnapStep
-from registration_core.kernels import Array32, from_rows, to_rows
-from registration_core.modes import distinct
-from registration_core.polish import FINAL_TUKEY, covariance, eased
-from registration_core.precision import surface_spreads
-from registration_core.search import Search
-from registration_core.selection import Judgement, match_shares, scores
+from registration_core.geometry.kernels import Array32, from_rows, to_rows
+from registration_core.judge.ambiguity import ambiguities
+from registration_core.judge.certificates import certified
+from registration_core.judge.confidence import Modes, belief_in_first, confidence, grouped
+from registration_core.judge.precision import surface_spreads
+from registration_core.judge.selection import Judgement, match_shares, scores
+from registration_core.search.modes import distinct
+from registration_core.search.polish import FINAL_TUKEY, covariance, eased
+from registration_core.search.sparse_score import heavy_tails
 from registration_core.snap_run import SnapRun
+from registration_core.view_search import ViewSearch
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def nothing_seen(run: SnapRun, iteration: int) -> SnapStep:
     return _final(run, iteration, start[None], np.ones(1), UNSEEN_CONFIDENCE, False)
 
 
-def found_anywhere(search: Search, candidates: Array32, most: int) -> tuple[Hypothesis, ...]:
+def found_anywhere(search: ViewSearch, candidates: Array32, most: int) -> tuple[Hypothesis, ...]:
     """At most so many modes of candidates (N, 3, 4), best first and each with its chance, where there is no
     start; none where nothing fits.
     """

@@ -29,7 +29,7 @@ def run_snap6d(
 ) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
     return subprocess.run(
-        [sys.executable, "-m", "app.cli", *arguments],
+        [sys.executable, "-m", "app.cli.commands", *arguments],
         env=environment(state_dir) | variables,
         cwd=PROJECT,
         input=typed,
@@ -101,7 +101,7 @@ class Server:
 def start_server(state_dir: Path, *arguments: str) -> Server:
     """Start a server on a free port and wait until it tells its sign-in link."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "app.cli", "serve", "--port", "0", *arguments],
+        [sys.executable, "-m", "app.cli.commands", "serve", "--port", "0", *arguments],
         env=environment(state_dir),
         cwd=PROJECT,
         stdout=subprocess.PIPE,

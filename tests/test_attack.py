@@ -8,7 +8,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.api.body_limits import BodyLimits
 from app.api.host_names import HostNames
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.conftest import cluster, demo, imported_state, own_live, state_dir
 from tests.app.live import LiveServer
 from tests.tools.attack.__main__ import KINDS, own_server, report

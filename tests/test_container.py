@@ -21,7 +21,7 @@ import yaml
 from typer.main import get_command
 
 from app.api import health
-from app.cli import cli
+from app.cli.commands import cli
 from tests.conftest import REPOSITORY
 from tests.tools.dockerfile import Ignored, health_command, read_dockerfile
 
@@ -151,7 +151,7 @@ def test_services_name_each_other_rightly() -> None:
 def test_workers_have_one_thread_and_load_the_kernels_first() -> None:
     command = SERVICES["worker"]["command"]
     assert command[command.index("--nthreads") + 1] == "1"
-    assert command[command.index("--preload") + 1] == "app.worker"
+    assert command[command.index("--preload") + 1] == "app.workers.jobs"
     assert "${SNAP6D_WORKERS:-2}" in SERVICES["worker"]["deploy"]["replicas"]
 
 

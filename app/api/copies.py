@@ -3,16 +3,16 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
+from app.access.auth import Identity
+from app.api.dependencies import AnyoneDep, LiveSessionDep, ServicesDep
 from app.api.registration_state import RegistrationOut, registration_out
-from app.auth import Identity
-from app.labeling.copying import Copy, copies_for
-from app.labeling.desk import NotFoundError
-from app.labeling.history import PosedBy
-from app.labeling.seat import Seat
-from app.labeling.tools import require
+from app.labeling.live.live_session import LiveSession
+from app.labeling.live.sessions import NotFoundError
+from app.labeling.moves.copying import Copy, copies_for
+from app.labeling.moves.history import PosedBy
+from app.labeling.permissions import require
 from app.services import Services
-from app.tables import Pose
+from app.storage.tables import Pose
 
 router = APIRouter(prefix="/api/registrations", tags=["copies"])
 
@@ -46,26 +46,28 @@ class CopyChoice(BaseModel):
 
 
 @router.get("/{registration_id}/copies")
-def list_copies(seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> Copies:
+def list_copies(live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep) -> Copies:
     """Poses that can be copied: of other operators, then of the neighbouring frames, nearest first."""
-    found = _copies(seat, services, identity)
+    found = _copies(live_session, services, identity)
     return Copies(items=[_copy_out(copy, identity) for copy in found.values()])
 
 
 @router.post("/{registration_id}/copy")
-def copy_pose(body: CopyChoice, seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
+def copy_pose(
+    body: CopyChoice, live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep
+) -> RegistrationOut:
     """Put the object where another registration has it."""
-    copy = _copies(seat, services, identity).get(body.registration_id)
+    copy = _copies(live_session, services, identity).get(body.registration_id)
     if copy is None:
         raise NotFoundError(f"There is no pose of a registration {body.registration_id} to copy here.")
     detail = {"registration_id": copy.source.id, "user_id": copy.source.user_id}
-    seat.session.set_pose(copy.T_world_object, identity.actor, "copy", {"source": detail})
-    return registration_out(seat)
+    live_session.session.set_pose(copy.T_world_object, identity.actor, "copy", {"source": detail})
+    return registration_out(live_session)
 
 
-def _copies(seat: Seat, services: Services, identity: Identity) -> dict[int, Copy]:
-    require(seat.session.tools, "copy")
-    found = copies_for(seat.registration, identity, services.database, services.log)
+def _copies(live_session: LiveSession, services: Services, identity: Identity) -> dict[int, Copy]:
+    require(live_session.session.tools, "copy")
+    found = copies_for(live_session.registration, identity, services.database, services.log)
     return {copy.source.id: copy for copy in found}
 
 

@@ -14,6 +14,7 @@ from sqlalchemy import distinct, func, select
 from sqlalchemy.orm import Session
 from starlette.datastructures import UploadFile
 
+from app.access.auth import Identity
 from app.api.dependencies import (
     AdminDep,
     AfterDep,
@@ -27,17 +28,16 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.problems import InputError
-from app.archives import import_archive
-from app.auth import Identity
-from app.calibrating import FEWEST
+from app.confidence.assessment import Standard
+from app.confidence.calibrating import FEWEST
 from app.config import LEAST_RISK
-from app.importing import ImplausibleDepthError
-from app.labeling.assessment import Standard
+from app.datasets.archives import import_archive
+from app.datasets.importing import ImplausibleDepthError
 from app.services import Services
-from app.tables import OUTSIDE_STUDIES, CalibrationRow, Dataset, Object, Registration, Scene, Task
-from app.unfinished import unfinished
-from registration_core.acceptance import fewest
+from app.storage.tables import OUTSIDE_STUDIES, CalibrationRow, Dataset, Object, Registration, Scene, Task
+from app.storage.unfinished import unfinished
 from registration_core.algorithm import ALGORITHM
+from registration_core.judge.acceptance import fewest
 
 router = APIRouter(prefix="/api/datasets", tags=["datasets"])
 

@@ -13,13 +13,14 @@ from sqlalchemy.orm import Session
 from sqlalchemy.orm.interfaces import ORMOption
 from starlette.requests import HTTPConnection
 
+from app.access.auth import Identity
 from app.api.problems import InputError
-from app.auth import Identity, Role
-from app.labeling.seat import Seat
+from app.labeling.live.live_session import LiveSession
 from app.services import Services
+from app.storage.roles import Role
+from app.storage.tables import Pose
 from app.study.participation import sees
-from app.tables import Pose
-from registration_core import pose
+from registration_core.geometry import pose
 
 SESSION_COOKIE = "snap6d_session"
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
@@ -143,12 +144,12 @@ Choice = Annotated[str | None, Query(max_length=500)]
 """A name that something has to have; all where it is left out."""
 
 
-def my_seat(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> Seat:
+def my_seat(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> LiveSession:
     """The caller's own live session."""
-    return services.desk.seat(registration_id, identity)
+    return services.live_sessions.open(registration_id, identity)
 
 
-SeatDep = Annotated[Seat, Depends(my_seat)]
+LiveSessionDep = Annotated[LiveSession, Depends(my_seat)]
 
 
 def check_sees(services: Services, identity: Identity, what: ColumnElement[bool], name: str) -> None:

@@ -21,9 +21,9 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.problems import InputError
-from app.export.selection import Choice
+from app.export.content.selection import Choice
 from app.services import Services
-from app.tables import Dataset, Export, Format, Scene
+from app.storage.tables import Dataset, Export, Format, Scene
 
 router = APIRouter(prefix="/api/exports", tags=["exports"])
 

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import select
 
-from app import textured_mesh
+from app.access.auth import Identity
 from app.api.dependencies import (
     AfterDep,
     AnyoneDep,
@@ -21,13 +21,13 @@ from app.api.dependencies import (
     row_or_404,
 )
 from app.api.scenes import FOREVER
-from app.auth import Identity
-from app.labeling.desk import NotFoundError
-from app.outline_mesh import packed
+from app.datasets import textured_mesh
+from app.datasets.outline_mesh import packed
+from app.datasets.symmetries import present_axes, suggestions_of, version_before
+from app.labeling.live.sessions import NotFoundError
 from app.services import Services
-from app.symmetries import present_axes, suggestions_of, version_before
-from app.tables import Object, Task
-from registration_core.mesh_file import plain_ply, read_mesh
+from app.storage.tables import Object, Task
+from registration_core.geometry.mesh_file import plain_ply, read_mesh
 
 router = APIRouter(prefix="/api/objects", tags=["objects"])
 

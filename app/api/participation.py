@@ -5,10 +5,11 @@ from typing import Annotated, cast
 from fastapi import APIRouter, Depends, HTTPException
 from pydantic import BaseModel, Field
 
+from app.access.auth import Identity
 from app.api.dependencies import AnyoneDep, ServicesDep
-from app.auth import Identity, Role
+from app.storage.roles import Role
+from app.storage.tables import Condition, Mode
 from app.study.participation import Place, ScreenKind, place_of
-from app.tables import Condition, Mode
 
 router = APIRouter(prefix="/api/participation", tags=["studies"])
 
@@ -96,7 +97,7 @@ def answer(body: Answers, services: ServicesDep, identity: ParticipantDep) -> Pa
 def withdraw(services: ServicesDep, identity: ParticipantDep) -> None:
     """I leave the study: my data are left out from now on, and my link is void."""
     services.studies.withdraw(place_of(services.database, identity.user_id).participant.id)
-    services.desk.leave(identity.user_id)
+    services.live_sessions.leave(identity.user_id)
 
 
 def _out(place: Place) -> ParticipationOut:

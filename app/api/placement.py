@@ -7,16 +7,16 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
+from app.api.dependencies import AnyoneDep, LiveSessionDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, frame_of, points_of, target_of, viewpoint_of
 from app.api.registration_state import RegistrationOut, registration_out
-from app.labeling import placement, viewpoint
-from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.seat import Seat
-from app.labeling.track import ActionError
-from app.scene_data import SceneData
-from app.tables import Frame
-from registration_core import pose
+from app.datasets.scene_data import SceneData
+from app.labeling.live.live_session import LiveSession
+from app.labeling.moves import placement, viewpoint
+from app.labeling.moves.degrees_of_freedom import GizmoAxes
+from app.labeling.moves.pose_record import ActionError
+from app.storage.tables import Frame
+from registration_core.geometry import pose
 
 router = APIRouter(prefix="/api/registrations", tags=["placement"])
 
@@ -59,91 +59,91 @@ class GizmoChoice(BaseModel):
 
 
 @router.post("/{registration_id}/nudge")
-def nudge(body: Nudge, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
+def nudge(body: Nudge, live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
     """Move the object a little, or turn it about its middle."""
     translation, rotation = np.array(body.translation), np.array(body.rotation)
 
     def change(T_world_object: Array) -> Array:
-        axes = _axes(seat, body.axes, T_world_object)
-        return placement.nudged(T_world_object, axes, translation, rotation, seat.model.centre)
+        axes = _axes(live_session, body.axes, T_world_object)
+        return placement.nudged(T_world_object, axes, translation, rotation, live_session.model.centre)
 
-    seat.session.move(change, identity.actor, body.technique)
-    return registration_out(seat)
+    live_session.session.move(change, identity.actor, body.technique)
+    return registration_out(live_session)
 
 
 @router.post("/{registration_id}/rest")
-def rest(seat: SeatDep, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
+def rest(live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep) -> RegistrationOut:
     """Put the object down on the surface near it, without turning it."""
 
     def change(T_world_object: Array) -> Array:
-        centre = pose.apply(T_world_object, seat.model.centre)
-        plane = _plane(services.data, frame_of(seat), centre, seat.model.radius)
+        centre = pose.apply(T_world_object, live_session.model.centre)
+        plane = _plane(services.data, frame_of(live_session), centre, live_session.model.radius)
         if plane is None:
             raise ActionError("There is no flat surface near the object; bring it closer to one.")
-        return placement.rested(T_world_object, seat.model.vertices, plane)
+        return placement.rested(T_world_object, live_session.model.vertices, plane)
 
-    seat.session.move(change, identity.actor, "rest")
-    return registration_out(seat)
+    live_session.session.move(change, identity.actor, "rest")
+    return registration_out(live_session)
 
 
 @router.post("/{registration_id}/place")
 def place(
-    body: PixelPoint | ViewPoint, seat: SeatDep, services: ServicesDep, identity: AnyoneDep
+    body: PixelPoint | ViewPoint, live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep
 ) -> RegistrationOut:
     """Put the object where somebody pointed, without turning it.
 
     On a bare surface it comes to stand. On anything else its own surface meets the point, along the ray
     from the eye.
     """
-    target = target_of(body, seat, services.data)
+    target = target_of(body, live_session, services.data)
 
     def change(T_world_object: Array) -> Array:
-        plane = _plane(services.data, target.frame, target.point, seat.model.radius)
-        return placement.placed(T_world_object, seat.model, target.point, target.eye, plane)
+        plane = _plane(services.data, target.frame, target.point, live_session.model.radius)
+        return placement.placed(T_world_object, live_session.model, target.point, target.eye, plane)
 
-    seat.session.move(change, identity.actor, "place")
-    return registration_out(seat)
+    live_session.session.move(change, identity.actor, "place")
+    return registration_out(live_session)
 
 
 @router.post("/{registration_id}/look", status_code=204)
-def look(body: Look, seat: SeatDep, services: ServicesDep) -> None:
+def look(body: Look, live_session: LiveSessionDep, services: ServicesDep) -> None:
     """Look at the object from elsewhere in the operator's 3-D view; not while it is being dragged."""
-    now = viewpoint_of(seat)
-    state = seat.session.snapshot()
+    now = viewpoint_of(live_session)
+    state = live_session.session.snapshot()
     if state.dragging:
         raise ActionError("The object is being dragged; the view stays as it is.")
-    T_world_sensor = np.array(frame_of(seat).T_world_camera)
-    centre = pose.apply(state.T_world_object, seat.model.centre)
+    T_world_sensor = np.array(frame_of(live_session).T_world_camera)
+    centre = pose.apply(state.T_world_object, live_session.model.centre)
     match body.at:
         case "sensor":
             then = viewpoint.from_sensor(now, T_world_sensor, centre)
         case "object":
-            then = viewpoint.closer(now, centre, seat.model.radius)
+            then = viewpoint.closer(now, centre, live_session.model.radius)
         case "left" | "right":
             then = viewpoint.turned(now, centre, -TURN if body.at == "left" else TURN)
         case side:
-            plane = _plane(services.data, frame_of(seat), centre, seat.model.radius)
+            plane = _plane(services.data, frame_of(live_session), centre, live_session.model.radius)
             up = -T_world_sensor[:3, 1] if plane is None else plane[:3]
-            then = viewpoint.from_side(now, side, centre, seat.model.radius, T_world_sensor, up)
-    assert seat.view is not None
-    seat.view.look(then)
+            then = viewpoint.from_side(now, side, centre, live_session.model.radius, T_world_sensor, up)
+    assert live_session.view is not None
+    live_session.view.look(then)
 
 
 @router.put("/{registration_id}/gizmo")
-def align_gizmo(body: GizmoChoice, seat: SeatDep) -> RegistrationOut:
+def align_gizmo(body: GizmoChoice, live_session: LiveSessionDep) -> RegistrationOut:
     """Let the gizmo's arrows lie along the object's axes or the world's."""
-    seat.session.align_gizmo(body.axes)
-    return registration_out(seat)
+    live_session.session.align_gizmo(body.axes)
+    return registration_out(live_session)
 
 
-def _axes(seat: Seat, name: str, T_world_object: Array) -> Array:
+def _axes(live_session: LiveSession, name: str, T_world_object: Array) -> Array:
     """Axes as the columns of (3, 3), in the world's frame."""
     if name == "world":
         return np.eye(3)
     if name == "object":
         return T_world_object[:3, :3]
-    seen_from = seat.view.viewpoint if seat.view else None
-    T = seen_from.T_world_camera if seen_from else np.array(frame_of(seat).T_world_camera)
+    seen_from = live_session.view.viewpoint if live_session.view else None
+    T = seen_from.T_world_camera if seen_from else np.array(frame_of(live_session).T_world_camera)
     return T[:3, :3]
 
 

@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
 from app.api.problems import InputError
-from app.labeling import placement
-from app.labeling.seat import Seat
-from app.labeling.track import ActionError
-from app.labeling.viewpoint import Viewpoint
-from app.scene_data import SceneData, camera_of
-from app.tables import Frame
+from app.datasets.scene_data import SceneData, camera_of
+from app.labeling.live.live_session import LiveSession
+from app.labeling.moves import placement
+from app.labeling.moves.pose_record import ActionError
+from app.labeling.moves.viewpoint import Viewpoint
+from app.storage.tables import Frame
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Target:
     """Whose depth image measured it."""
 
 
-def target_of(pointed: PixelPoint | ViewPoint, seat: Seat, data: SceneData) -> Target:
+def target_of(pointed: PixelPoint | ViewPoint, live_session: LiveSession, data: SceneData) -> Target:
     """The measured point that somebody points at.
 
     Raises:
@@ -55,10 +55,10 @@ def target_of(pointed: PixelPoint | ViewPoint, seat: Seat, data: SceneData) -> T
         ActionError: where nothing was measured there, or nobody has the 3-D view open.
     """
     if isinstance(pointed, PixelPoint):
-        frame = frame_of(seat, pointed.frame_id)
+        frame = frame_of(live_session, pointed.frame_id)
         eye = np.array(frame.T_world_camera)[:3, 3]
         return Target(_point_in_image(data, frame, pointed), eye, frame)
-    frame, seen_from = frame_of(seat), viewpoint_of(seat)
+    frame, seen_from = frame_of(live_session), viewpoint_of(live_session)
     ray = seen_from.ray(pointed.across, pointed.down)
     point = placement.point_along_ray(points_of(data, frame), seen_from.position, ray)
     if point is None:
@@ -66,17 +66,17 @@ def target_of(pointed: PixelPoint | ViewPoint, seat: Seat, data: SceneData) -> T
     return Target(point, seen_from.position, frame)
 
 
-def frame_of(seat: Seat, frame_id: int | None = None) -> Frame:
+def frame_of(live_session: LiveSession, frame_id: int | None = None) -> Frame:
     """A frame of the scene: the one that is shown, where none is named."""
-    frame_id = seat.session.snapshot().frame_id if frame_id is None else frame_id
-    if frame_id not in seat.frames:
+    frame_id = live_session.session.snapshot().frame_id if frame_id is None else frame_id
+    if frame_id not in live_session.frames:
         raise ActionError(f"Frame {frame_id} does not belong to this scene.")
-    return seat.frames[frame_id]
+    return live_session.frames[frame_id]
 
 
-def viewpoint_of(seat: Seat) -> Viewpoint:
+def viewpoint_of(live_session: LiveSession) -> Viewpoint:
     """From where the operator looks at the 3-D view."""
-    seen_from = seat.view.viewpoint if seat.view else None
+    seen_from = live_session.view.viewpoint if live_session.view else None
     if seen_from is None:
         raise ActionError("Nobody has the 3-D view of this registration open.")
     return seen_from

@@ -12,14 +12,14 @@ from fastapi.responses import JSONResponse
 from sqlalchemy.exc import InternalError, OperationalError
 from starlette.exceptions import HTTPException
 
-from app.auth import SignInError, TooManyAttemptsError
-from app.event_log import ErasedError
-from app.labeling.desk import NotFoundError
-from app.labeling.track import ActionError
-from app.storage import DamagedFileError
-from app.storage_faults import FULL, advice
+from app.access.auth import SignInError, TooManyAttemptsError
+from app.datasets.symmetries import OutdatedError
+from app.labeling.live.sessions import NotFoundError
+from app.labeling.moves.pose_record import ActionError
+from app.storage.event_log import ErasedError
+from app.storage.faults import FULL, advice
+from app.storage.files import DamagedFileError
 from app.study.plan import StudyError
-from app.symmetries import OutdatedError
 
 logger = logging.getLogger(__name__)
 

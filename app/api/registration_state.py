@@ -5,16 +5,16 @@ from dataclasses import asdict
 import numpy as np
 from pydantic import BaseModel, Field
 
-from app.labeling.assessment import Assessed, Assessment
-from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.history import PosedBy
+from app.confidence.assessment import Assessed, Assessment
 from app.labeling.layers import Layers
-from app.labeling.seat import Seat
+from app.labeling.live.live_session import LiveSession
+from app.labeling.moves.degrees_of_freedom import GizmoAxes
+from app.labeling.moves.history import PosedBy
+from app.labeling.permissions import Tool
 from app.labeling.session_state import SessionState
-from app.labeling.tools import Tool
-from app.tables import FrameUse, Method, Pose
-from registration_core import pose
-from registration_core.depth_agreement import Verdict
+from app.storage.tables import FrameUse, Method, Pose
+from registration_core.geometry import pose
+from registration_core.rendering.depth_verdicts import Verdict
 
 
 class AssessmentOut(BaseModel):
@@ -149,20 +149,20 @@ class RegistrationOut(BaseModel):
     )
 
 
-def registration_out(seat: Seat) -> RegistrationOut:
+def registration_out(live_session: LiveSession) -> RegistrationOut:
     """A live session as JSON."""
-    state = seat.session.snapshot()
-    T_world_camera = np.array(seat.frames[state.frame_id].T_world_camera)
+    state = live_session.session.snapshot()
+    T_world_camera = np.array(live_session.frames[state.frame_id].T_world_camera)
     return RegistrationOut(
         id=state.registration_id,
         revision=state.revision,
-        task_id=seat.registration.task_id,
-        condition=seat.registration.task.condition,
-        tools=sorted(seat.session.tools),
+        task_id=live_session.registration.task_id,
+        condition=live_session.registration.task.condition,
+        tools=sorted(live_session.session.tools),
         method=state.method,
-        methods=list(seat.session.methods),
+        methods=list(live_session.session.methods),
         frame_use=state.frame_use,
-        frame_uses=list(seat.session.frame_uses),
+        frame_uses=list(live_session.session.frame_uses),
         state=state.state,
         skip_reason=state.skip_reason,
         frame_id=state.frame_id,
@@ -176,21 +176,21 @@ def registration_out(seat: Seat) -> RegistrationOut:
         dragging=state.dragging,
         gizmo_axes=state.gizmo_axes,
         layers=state.layers,
-        has_texture=seat.textured is not None,
-        agreement=_agreement_out(seat, state),
+        has_texture=live_session.textured is not None,
+        agreement=_agreement_out(live_session, state),
         saved=not state.dragging,
         snap=_snap_out(state),
         offer=_offer_out(state),
         is_live=state.is_live,
         live=_live_out(state),
-        symmetries_version=seat.object.present.symmetries_version,
+        symmetries_version=live_session.object.present.symmetries_version,
         estimate_snap_id=state.estimate_snap_id,
         search=_search_out(state),
         preview=None if state.preview is None else state.preview.tolist(),
         message=state.message,
         view_url=f"/view/{state.registration_id}/",
-        view_open=seat.viewers > 0,
-        others=list(seat.others()),
+        view_open=live_session.viewers > 0,
+        others=list(live_session.others()),
     )
 
 
@@ -214,10 +214,10 @@ def _snap_out(state: SessionState) -> SnapOut | None:
     )
 
 
-def _agreement_out(seat: Seat, state: SessionState) -> AgreementOut | None:
-    if "agreement" not in seat.session.tools:
+def _agreement_out(live_session: LiveSession, state: SessionState) -> AgreementOut | None:
+    if "agreement" not in live_session.session.tools:
         return None
-    agreement = seat.reading.of(state.frame_id, state.T_world_object)
+    agreement = live_session.reading.of(state.frame_id, state.T_world_object)
     if not len(agreement.verdicts):
         return None
     return AgreementOut(

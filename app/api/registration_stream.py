@@ -8,7 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from app.api.dependencies import SeatDep, ServicesDep, identify
+from app.api.dependencies import LiveSessionDep, ServicesDep, identify
 from app.api.registration_state import registration_out
 from app.labeling.session_state import SessionState
 
@@ -27,7 +27,7 @@ PageName = Annotated[
 
 @router.get("/{registration_id}/stream", response_class=EventSourceResponse)
 async def stream(
-    request: Request, seat: SeatDep, services: ServicesDep, page: PageName = None
+    request: Request, live_session: LiveSessionDep, services: ServicesDep, page: PageName = None
 ) -> AsyncIterator[ServerSentEvent]:
     """Server-sent events: the registration at once, again whenever it changes, and every ten seconds.
 
@@ -38,32 +38,32 @@ async def stream(
     """
     loop = asyncio.get_running_loop()
     changed = asyncio.Event()
-    leave = services.desk.watch(seat)
+    leave = services.live_sessions.watch(live_session)
 
     given_way = threading.Event()
 
     def tell(_state: SessionState) -> None:
         loop.call_soon_threadsafe(changed.set)
 
-    def give_way() -> None:
+    def on_taken_over() -> None:
         given_way.set()
         loop.call_soon_threadsafe(changed.set)
 
     def tell_others() -> None:
-        loop.run_in_executor(None, services.desk.tell_others, seat)
+        loop.run_in_executor(None, services.live_sessions.tell_others, live_session)
 
-    unsubscribe = seat.session.subscribe(tell)
-    stand_up = None
+    unsubscribe = live_session.session.subscribe(tell)
+    release = None
     if page:
-        stand_up = seat.chair.sit(page, give_way)
+        release = live_session.page_lease.take(page, on_taken_over)
         tell_others()
     try:
         while True:
             changed.clear()
             if given_way.is_set():
-                yield ServerSentEvent(event="taken_over", data={"id": seat.registration.id})
+                yield ServerSentEvent(event="taken_over", data={"id": live_session.registration.id})
                 return
-            out = await asyncio.to_thread(registration_out, seat)
+            out = await asyncio.to_thread(registration_out, live_session)
             yield ServerSentEvent(event="registration", data=out)
             await asyncio.sleep(SECONDS_BETWEEN_UPDATES)
             if not await _in_time(changed) and await asyncio.to_thread(identify, request) is None:
@@ -71,8 +71,8 @@ async def stream(
     finally:
         unsubscribe()
         leave()
-        if stand_up:
-            stand_up()
+        if release:
+            release()
             tell_others()
 
 

@@ -15,17 +15,17 @@ from app.api.dependencies import (
     Id,
     IdentityDep,
     LimitDep,
+    LiveSessionDep,
     Page,
-    SeatDep,
     ServicesDep,
     page_of,
     rigid_pose,
 )
 from app.api.registration_state import RegistrationOut, registration_out
-from app.auth import Actor
 from app.labeling.layers import Layers
 from app.labeling.session import LabelingSession
-from app.tables import Event, FrameUse, Method, Pose
+from app.storage.roles import Actor
+from app.storage.tables import Event, FrameUse, Method, Pose
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
@@ -95,59 +95,59 @@ class EventOut(BaseModel):
 
 
 @router.get("/{registration_id}")
-def get_registration(seat: SeatDep) -> RegistrationOut:
+def get_registration(live_session: LiveSessionDep) -> RegistrationOut:
     """How a registration of mine stands."""
-    return registration_out(seat)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/pose")
-def set_pose(body: NewPose, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
+def set_pose(body: NewPose, live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
     """Put the object at a pose."""
     T_world_object = rigid_pose(body.T_world_object, "T_world_object")
     detail = {} if body.stems_from is None else {"stems_from": body.stems_from}
-    seat.session.set_pose(T_world_object, identity.actor, body.technique, detail)
-    return registration_out(seat)
+    live_session.session.set_pose(T_world_object, identity.actor, body.technique, detail)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/frame")
-def show_frame(body: FrameChoice, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
+def show_frame(body: FrameChoice, live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
     """Show, and snap against, another frame of the scene."""
-    seat.session.show_frame(body.frame_id, identity.actor)
-    return registration_out(seat)
+    live_session.session.show_frame(body.frame_id, identity.actor)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/live")
-def set_live(body: LiveChoice, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
+def set_live(body: LiveChoice, live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
     """Turn live snapping on or off."""
-    seat.session.set_live(body.on, identity.actor)
-    return registration_out(seat)
+    live_session.session.set_live(body.on, identity.actor)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/method")
-def choose_method(body: MethodChoice, seat: SeatDep) -> RegistrationOut:
+def choose_method(body: MethodChoice, live_session: LiveSessionDep) -> RegistrationOut:
     """Choose what Snap computes with; live snapping, `auto` and the search stay with the default."""
-    seat.session.choose_method(body.method)
-    return registration_out(seat)
+    live_session.session.choose_method(body.method)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/snap-frames")
-def choose_frames(body: FramesChoice, seat: SeatDep) -> RegistrationOut:
+def choose_frames(body: FramesChoice, live_session: LiveSessionDep) -> RegistrationOut:
     """Choose the frames that Snap uses: those that see the object, or the one that is shown alone."""
-    seat.session.choose_frames(body.frames)
-    return registration_out(seat)
+    live_session.session.choose_frames(body.frames)
+    return registration_out(live_session)
 
 
 @router.put("/{registration_id}/layers")
-def show_layers(body: Layers, seat: SeatDep) -> RegistrationOut:
+def show_layers(body: Layers, live_session: LiveSessionDep) -> RegistrationOut:
     """Let the 3-D view show or hide the cloud, the mesh, and the colours of depth agreement on it."""
-    seat.session.show_layers(body)
-    return registration_out(seat)
+    live_session.session.show_layers(body)
+    return registration_out(live_session)
 
 
 def _add_action(name: str, act: Callable[[LabelingSession, Actor], None], summary: str) -> None:
-    def route(seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
-        act(seat.session, identity.actor)
-        return registration_out(seat)
+    def route(live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
+        act(live_session.session, identity.actor)
+        return registration_out(live_session)
 
     router.add_api_route(
         f"/{{registration_id}}/{name}", route, methods=["POST"], summary=summary, name=f"{name}_registration"
@@ -164,10 +164,10 @@ _add_action("reopen", LabelingSession.reopen, "Go on with what was submitted or 
 
 
 @router.post("/{registration_id}/skip")
-def skip(body: Skip, seat: SeatDep, identity: AnyoneDep) -> RegistrationOut:
+def skip(body: Skip, live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
     """Finish without a pose."""
-    seat.session.skip(identity.actor, body.reason)
-    return registration_out(seat)
+    live_session.session.skip(identity.actor, body.reason)
+    return registration_out(live_session)
 
 
 @router.get("/{registration_id}/events")
@@ -179,7 +179,7 @@ def list_events(
     limit: LimitDep = 100,
 ) -> Page:
     """The log of a registration: one's own, or anyone's for a reviewer."""
-    services.desk.check_readable(registration_id, identity)
+    services.live_sessions.check_readable(registration_id, identity)
     query = select(Event).where(Event.registration_id == registration_id)
     with services.database.read() as session:
         return page_of(session, query, Event.sequence, after, limit, _event_out)

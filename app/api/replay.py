@@ -6,18 +6,19 @@ import numpy as np
 from fastapi import APIRouter, Depends
 from pydantic import BaseModel, Field
 
-from app.analysis.pose_errors import PoseErrors, pose_errors
-from app.analysis.trace import SAMPLE_SECONDS, Trace
+from app.analysis.trace.pose_errors import PoseErrors, pose_errors
+from app.analysis.trace.trace import SAMPLE_SECONDS, Trace
 from app.api.dependencies import Id, IdentityDep, ServicesDep
 from app.api.registration_state import AssessmentOut, FramesReportOut, assessment_out
 from app.api.tasks import Named
-from app.labeling.assessment import Assessed, Assessment
-from app.labeling.history import PosedBy
-from app.methods import method_of
+from app.confidence.assessment import Assessed, Assessment
+from app.labeling.moves.history import PosedBy
 from app.replay.recording import Recording, ShownEvent
 from app.replay.replays import Replay
-from app.tables import Method, Pose
-from registration_core import ObjectModel, pose
+from app.storage.tables import Method, Pose
+from app.workers.methods import method_of
+from registration_core import ObjectModel
+from registration_core.geometry import pose
 
 router = APIRouter(prefix="/api/registrations", tags=["replay"])
 
@@ -119,7 +120,7 @@ class MomentOut(BaseModel):
 
 def my_replay(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> Replay:
     """The caller's replay of a registration that they may read."""
-    services.desk.check_readable(registration_id, identity)
+    services.live_sessions.check_readable(registration_id, identity)
     return services.replays.get(registration_id, identity.user_id)
 
 
@@ -129,7 +130,7 @@ ReplayDep = Annotated[Replay, Depends(my_replay)]
 @router.get("/{registration_id}/trace")
 def get_trace(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> TraceOut:
     """The time line of a registration: one's own, or anyone's for a reviewer."""
-    services.desk.check_readable(registration_id, identity)
+    services.live_sessions.check_readable(registration_id, identity)
     registration, recording = services.replays.recorded(registration_id)
     trace = recording.trace
     return TraceOut(
@@ -150,7 +151,7 @@ def get_trace(registration_id: Id, services: ServicesDep, identity: IdentityDep)
 @router.post("/{registration_id}/replay")
 def open_replay(registration_id: Id, services: ServicesDep, identity: IdentityDep) -> ReplayOut:
     """Open my replay of a registration, or bring it up to what the log holds by now."""
-    services.desk.check_readable(registration_id, identity)
+    services.live_sessions.check_readable(registration_id, identity)
     services.replays.open(registration_id, identity.user_id)
     return ReplayOut(view_url=f"/view/replay/{registration_id}/")
 

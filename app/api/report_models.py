@@ -6,16 +6,16 @@ from typing import Any
 
 from pydantic import BaseModel, Field
 
-from app.analysis.bootstrap import Interval
-from app.analysis.cautions import fitts_caution, hand_off_caution
-from app.analysis.cells import Cell, Drawn, StgCurve
-from app.analysis.comparison import Comparison
-from app.analysis.fitts import Fitts
-from app.analysis.gains import Gain, Moment
-from app.analysis.hand_off import HandOff
-from app.analysis.remarks import Remark
-from app.analysis.trial import ErrorKind
-from app.tables import Method
+from app.analysis.statistics.bootstrap import Interval
+from app.analysis.statistics.cautions import fitts_caution, hand_off_caution
+from app.analysis.statistics.cells import Cell, Drawn, StgCurve
+from app.analysis.statistics.comparison import Comparison
+from app.analysis.statistics.fitts import Fitts
+from app.analysis.statistics.gains import Gain, Moment
+from app.analysis.statistics.hand_off import HandOff
+from app.analysis.study_data.remarks import Remark
+from app.analysis.study_data.trial import ErrorKind
+from app.storage.tables import Method
 
 
 class IntervalOut(BaseModel):

@@ -6,11 +6,11 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, HTTPException, Query, Response
 from pydantic import BaseModel, Field
 
-from app.analysis.collect import TruthSource
-from app.analysis.curves import PAPER_SECONDS, SNAP_SECONDS
-from app.analysis.report import Report, ReportConfig, report_of
-from app.analysis.selection import Selection, choices_of
-from app.analysis.trial import ErrorKind
+from app.analysis.report.report import Report, ReportConfig, report_of
+from app.analysis.statistics.curves import PAPER_SECONDS, SNAP_SECONDS
+from app.analysis.study_data.collect import TruthSource
+from app.analysis.study_data.selection import Selection, choices_of
+from app.analysis.study_data.trial import ErrorKind
 from app.api.dependencies import Choice, Id, ReviewerDep, ServicesDep
 from app.api.problems import InputError
 from app.api.report_models import (
@@ -170,7 +170,7 @@ def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
 )
 def get_file(name: str, asked: AskedDep) -> Response:
     """The figure (SVG, PDF), a table (CSV, Parquet) or the one-file page (HTML), the same bytes each time."""
-    from app.analysis.report_files import file_names, file_of  # what draws takes a second to import
+    from app.analysis.report.report_files import file_names, file_of
 
     if name not in file_names():
         raise HTTPException(404, f"A report has no file {name!r}; it has {', '.join(file_names())}.")

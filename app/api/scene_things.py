@@ -3,9 +3,9 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import Page, SeatDep
-from app.labeling.scene_things import Thing
-from app.tables import Pose
+from app.api.dependencies import LiveSessionDep, Page
+from app.labeling.scene.instances import SceneInstance
+from app.storage.tables import Pose
 
 router = APIRouter(prefix="/api/registrations", tags=["registrations"])
 
@@ -32,18 +32,18 @@ class Shown(BaseModel):
 
 
 @router.get("/{registration_id}/things")
-def list_things(seat: SeatDep) -> Page:
+def list_things(live_session: LiveSessionDep) -> Page:
     """What is asked for in the scene, in the order of the tasks; snaps know those with a pose."""
-    return Page(items=[_out(thing) for thing in seat.neighbours.things], next=None)
+    return Page(items=[_out(thing) for thing in live_session.neighbours.things], next=None)
 
 
 @router.put("/{registration_id}/things", status_code=204)
-def show_things(body: Shown, seat: SeatDep) -> None:
+def show_things(body: Shown, live_session: LiveSessionDep) -> None:
     """Show the things that are done in the operator's 3-D view, or hide them."""
-    seat.neighbours.show(body.on)
+    live_session.neighbours.show(body.on)
 
 
-def _out(thing: Thing) -> ThingOut:
+def _out(thing: SceneInstance) -> ThingOut:
     known = thing.known
     return ThingOut(
         task_id=thing.task_id,

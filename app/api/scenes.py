@@ -11,6 +11,7 @@ from pydantic import BaseModel
 from sqlalchemy import select
 from sqlalchemy.orm import selectinload
 
+from app.access.auth import Identity
 from app.api.dependencies import (
     AfterDep,
     AnyoneDep,
@@ -24,10 +25,9 @@ from app.api.dependencies import (
     page_of,
     row_or_404,
 )
-from app.auth import Identity
 from app.services import Services
-from app.tables import Frame, Pose, Scene, Task
-from registration_core.depth_agreement import TOLERANCE
+from app.storage.tables import Frame, Pose, Scene, Task
+from registration_core.rendering.depth_verdicts import TOLERANCE
 
 router = APIRouter(prefix="/api", tags=["scenes"])
 

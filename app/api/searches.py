@@ -5,16 +5,16 @@ from typing import Annotated, Any, cast
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import EXAMPLE_POSE, AnyoneDep, SeatDep, ServicesDep, rigid_pose
+from app.access.auth import Identity
+from app.api.dependencies import EXAMPLE_POSE, AnyoneDep, LiveSessionDep, ServicesDep, rigid_pose
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
 from app.api.snaps import INTERRUPTED, HypothesisOut, KnownObjectOut, SnapState
-from app.auth import Identity
-from app.scene_data import camera_of
+from app.datasets.scene_data import camera_of
 from app.services import Services
-from app.tables import Event, Pose
+from app.storage.tables import Event, Pose
 from registration_core import SnapConfig
-from registration_core.global_search import checked_region
+from registration_core.propose import checked_region
 
 router = APIRouter(prefix="/api", tags=["searches"])
 
@@ -70,13 +70,15 @@ class Preview(BaseModel):
 
 
 @router.post("/registrations/{registration_id}/searches", status_code=202)
-def request_search(seat: SeatDep, identity: AnyoneDep, body: NewSearch | None = None) -> SearchId:
+def request_search(
+    live_session: LiveSessionDep, identity: AnyoneDep, body: NewSearch | None = None
+) -> SearchId:
     """Ask the machine where in the frame the object may be."""
     wanted = body or NewSearch(region=None, seed=None, config=None)
-    session = seat.session
+    session = live_session.session
     try:
         config = SnapConfig.from_dict(wanted.config or {})
-        checked_region(wanted.region, camera_of(seat.frames[session.snapshot().frame_id]))
+        checked_region(wanted.region, camera_of(live_session.frames[session.snapshot().frame_id]))
     except ValueError as error:
         raise InputError(f"body.{error}.") from error
     return SearchId(id=session.search(identity.actor, wanted.region, config, wanted.seed))
@@ -87,7 +89,7 @@ def get_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> Se
     """How a search stands, with its candidates when it is done."""
     registration_id = _events(services, identity, search_id)[0].registration_id
     # Before the log: how this one ended is there by now.
-    now = services.desk.live_state(registration_id)
+    now = services.live_sessions.live_state(registration_id)
     live = now.search if now else None
     requested, *rest = _events(services, identity, search_id)
     outcome = rest[0] if rest else None
@@ -117,7 +119,7 @@ def get_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> Se
 def leave_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> SearchDetail:
     """Cancel a search of mine, or put its candidates away; in the log they stay."""
     registration_id = _events(services, identity, search_id)[0].registration_id
-    session = services.desk.seat(registration_id, identity).session
+    session = services.live_sessions.open(registration_id, identity).session
     live = session.snapshot().search
     if live is not None and live.id == search_id:
         session.leave_search(identity.actor)
@@ -125,16 +127,16 @@ def leave_search(search_id: str, services: ServicesDep, identity: AnyoneDep) -> 
 
 
 @router.put("/registrations/{registration_id}/preview")
-def preview(body: Preview, seat: SeatDep) -> RegistrationOut:
+def preview(body: Preview, live_session: LiveSessionDep) -> RegistrationOut:
     """Show a pose as a ghost, without moving the object; null shows nothing."""
     T = body.T_world_object
-    seat.session.preview(None if T is None else rigid_pose(T, "T_world_object"))
-    return registration_out(seat)
+    live_session.session.preview(None if T is None else rigid_pose(T, "T_world_object"))
+    return registration_out(live_session)
 
 
 def _events(services: Services, identity: Identity, search_id: str) -> list[Event]:
     events = [event for event in services.log.snap_events(search_id) if event.kind.startswith("search_")]
     if not events:
         raise HTTPException(404, f"There is no search {search_id}.")
-    services.desk.check_readable(events[0].registration_id, identity)
+    services.live_sessions.check_readable(events[0].registration_id, identity)
     return events

@@ -8,10 +8,10 @@ from fastapi import APIRouter, Cookie, HTTPException, Request, Response
 from pydantic import BaseModel, Field
 from sqlalchemy import func, select
 
+from app.access.auth import LOGIN_LIFETIME
 from app.api.dependencies import SESSION_COOKIE, AnyoneDep, ServicesDep, is_same_origin
-from app.auth import LOGIN_LIFETIME
 from app.services import Services
-from app.tables import Registration
+from app.storage.tables import Registration
 
 router = APIRouter(prefix="/api", tags=["sign-in"])
 

@@ -7,14 +7,14 @@ from typing import Annotated, Any, Literal, cast
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
+from app.access.auth import Identity
+from app.api.dependencies import AnyoneDep, LiveSessionDep, ServicesDep
 from app.api.problems import InputError
 from app.api.registration_state import AssessmentOut
-from app.auth import Identity
-from app.labeling.start_spread import Unsaid
-from app.methods import method_of
+from app.labeling.snaps.start_spread import Unsaid
 from app.services import Services
-from app.tables import EstimateRow, Event, FrameUse, Method, Pose
+from app.storage.tables import EstimateRow, Event, FrameUse, Method, Pose
+from app.workers.methods import method_of
 from registration_core import SnapConfig
 
 router = APIRouter(prefix="/api", tags=["snaps"])
@@ -193,11 +193,11 @@ class SnapDetail(BaseModel):
 
 
 @router.post("/registrations/{registration_id}/snaps", status_code=202)
-def request_snap(seat: SeatDep, identity: AnyoneDep, body: NewSnap | None = None) -> SnapId:
+def request_snap(live_session: LiveSessionDep, identity: AnyoneDep, body: NewSnap | None = None) -> SnapId:
     """Ask the machine for a better pose from the present one."""
     wanted = body or NewSnap(seed=None, config=None, frames=None)
     try:
-        config = SnapConfig.from_dict({"preset": seat.session.method, **(wanted.config or {})})
+        config = SnapConfig.from_dict({"preset": live_session.session.method, **(wanted.config or {})})
     except ValueError as error:
         raise InputError(f"body.{error}.") from error
     given = "start_spread" in wanted.model_fields_set
@@ -205,7 +205,7 @@ def request_snap(seat: SeatDep, identity: AnyoneDep, body: NewSnap | None = None
     frames = tuple(dict.fromkeys(wanted.frames)) if isinstance(wanted.frames, list) else wanted.frames
     if config.method == "particle_filter" and isinstance(frames, tuple) and len(frames) > 1:
         raise InputError("body.frames must name one frame: the paper's filter knows one view.")
-    return SnapId(id=seat.session.snap(identity.actor, config, wanted.seed, spread, frames))
+    return SnapId(id=live_session.session.snap(identity.actor, config, wanted.seed, spread, frames))
 
 
 @router.get("/snaps/{snap_id}")
@@ -213,7 +213,7 @@ def get_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDe
     """How a snap stands, with its estimate when it is done."""
     registration_id = _events(services, identity, snap_id)[0].registration_id
     # Before the log: how this one ended is there by now.
-    now = services.desk.live_state(registration_id)
+    now = services.live_sessions.live_state(registration_id)
     live = now.snap if now else None
     outcome = next((event for event in services.log.snap_events(snap_id) if event.kind in OUTCOMES), None)
     if outcome is not None:
@@ -239,7 +239,7 @@ def get_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDe
 def cancel_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDetail:
     """Cancel a snap of mine; one that has ended stays as it is."""
     registration_id = _events(services, identity, snap_id)[0].registration_id
-    session = services.desk.seat(registration_id, identity).session
+    session = services.live_sessions.open(registration_id, identity).session
     live = session.snapshot().snap
     if live is not None and live.id == snap_id:
         session.cancel_snap(identity.actor)
@@ -250,7 +250,7 @@ def _events(services: Services, identity: Identity, snap_id: str) -> list[Event]
     events = list(services.log.snap_events(snap_id))
     if not events or events[0].kind == "search_requested":
         raise HTTPException(404, f"There is no snap {snap_id}.")
-    services.desk.check_readable(events[0].registration_id, identity)
+    services.live_sessions.check_readable(events[0].registration_id, identity)
     return events
 
 

@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from app.api.dependencies import AdminDep, AfterDep, Id, LimitDep, Page, ServicesDep, page_of, row_or_404
 from app.services import Services
+from app.storage.tables import Condition, Mode, Participant, Study
 from app.study.answers import answers_csv
 from app.study.plan import (
     MINUTES_A_TASK,
@@ -22,7 +23,6 @@ from app.study.plan import (
     rows_of_balance,
 )
 from app.study.studies import Standing
-from app.tables import Condition, Mode, Participant, Study
 
 router = APIRouter(prefix="/api/studies", tags=["studies"])
 
@@ -180,7 +180,7 @@ def close_study(study_id: Id, services: ServicesDep, _identity: AdminDep) -> Stu
     study = _study(services, study_id)
     services.studies.close(study_id)
     for standing in services.studies.progress(study.id):
-        services.desk.leave(standing.participant.user_id)
+        services.live_sessions.leave(standing.participant.user_id)
     return get_study(study_id, services, _identity)
 
 
@@ -210,7 +210,7 @@ def withdraw_participant(
     """Take a participant out, as they asked for: their data are left out, their link is void."""
     participant = _participant(services, study_id, participant_id)
     services.studies.withdraw(participant_id)
-    services.desk.leave(participant.user_id)
+    services.live_sessions.leave(participant.user_id)
 
 
 @router.delete("/{study_id}/participants/{participant_id}", status_code=204)
@@ -218,9 +218,9 @@ def erase_participant(study_id: Id, participant_id: Id, services: ServicesDep, _
     """Erase all that a participant did and answered, for good; that they were there stays."""
     participant = _participant(services, study_id, participant_id)
     services.studies.withdraw(participant_id)
-    services.desk.leave(participant.user_id)  # before erasing: closing a session may still write
+    services.live_sessions.leave(participant.user_id)  # before erasing: closing a session may still write
     services.studies.erase(participant_id)
-    services.desk.leave(participant.user_id)  # one that a request on its way had opened again
+    services.live_sessions.leave(participant.user_id)  # one that a request on its way had opened again
 
 
 def _study(services: Services, study_id: int) -> Study:

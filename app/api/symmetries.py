@@ -17,11 +17,12 @@ from app.api.dependencies import (
 from app.api.objects import ObjectDetail, detail_of
 from app.api.problems import InputError
 from app.api.tasks import Named
+from app.datasets.symmetries import axes_in, decide, restore, versions_of
 from app.services import Services
-from app.symmetries import axes_in, decide, restore, versions_of
-from app.tables import Object, SymmetryVersion
-from registration_core import SymmetryAxis, pose, residual_of
-from registration_core.symmetry_axes import HIGHEST_FOLD
+from app.storage.tables import Object, SymmetryVersion
+from registration_core import SymmetryAxis, residual_of
+from registration_core.geometry import pose
+from registration_core.symmetry.axes import HIGHEST_FOLD
 
 router = APIRouter(prefix="/api/objects", tags=["objects"])
 
@@ -95,7 +96,7 @@ def put_symmetries(object_id: Id, body: Decision, services: ServicesDep, identit
                 restore(session, row, body.restore, identity.user_id, body.version)
         except ValueError as error:
             raise InputError(f"body.{error}.") from error
-    services.desk.renew_object(object_id)
+    services.live_sessions.renew_object(object_id)
     services.preparation.look()
     return detail_of(services, _row(services, object_id))
 

@@ -10,6 +10,7 @@ from pydantic import BaseModel, Field
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
+from app.access.auth import Identity
 from app.api.dependencies import (
     AdminDep,
     AfterDep,
@@ -25,13 +26,13 @@ from app.api.dependencies import (
 )
 from app.api.problems import InputError
 from app.api.registration_state import AssessmentOut, RegistrationOut, registration_out
-from app.auth import Identity, Role
-from app.labeling.tools import methods_of
-from app.scene_data import camera_of
+from app.datasets.scene_data import camera_of
+from app.datasets.start_pose import start_pose
+from app.datasets.thumbnails import task_thumbnail
+from app.labeling.permissions import methods_of
 from app.services import Services
-from app.start_pose import start_pose
-from app.study.participation import require_turn
-from app.tables import (
+from app.storage.roles import Role
+from app.storage.tables import (
     LAST_ASSESSMENT,
     NAMED,
     OUTSIDE_STUDIES,
@@ -44,7 +45,7 @@ from app.tables import (
     Scene,
     Task,
 )
-from app.thumbnails import task_thumbnail
+from app.study.participation import require_turn
 
 router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 
@@ -228,7 +229,7 @@ def start_registration(task_id: Id, services: ServicesDep, identity: AnyoneDep) 
     check_sees(services, identity, Task.id == task_id, f"task {task_id}")
     if identity.role is Role.PARTICIPANT:
         require_turn(services.database, identity.user_id, task_id)
-    return registration_out(services.desk.start(task_id, identity))
+    return registration_out(services.live_sessions.start(task_id, identity))
 
 
 def _method(body: NewTask) -> Method:
@@ -310,7 +311,7 @@ def _state_of(registrations: Sequence[Registration]) -> TaskState:
 def _out_for(services: Services, identity: Identity) -> Callable[[Task], TaskOut]:
     """As somebody may know of tasks: a participant of a study of their own work, others of the ordinary."""
 
-    at_work = services.desk.at_work()
+    at_work = services.live_sessions.at_work()
 
     def out(row: Task) -> TaskOut:
         mine = [r for r in row.registrations if r.user_id == identity.user_id]

@@ -3,10 +3,10 @@
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from app.analysis.advice import advice_for
-from app.analysis.cells import cells_of
-from app.analysis.team import TEAM_TIMING, TeamRow, Work, team_rows
-from app.analysis.trial import TrialTrace
+from app.analysis.statistics.cells import cells_of
+from app.analysis.study_data.trial import TrialTrace
+from app.analysis.team.advice import advice_for
+from app.analysis.team.team import TEAM_TIMING, TeamRow, Work, team_rows
 from app.api.dependencies import Choice, ReviewerDep, ServicesDep
 from app.api.problems import InputError
 from app.api.report_models import CellOut, RemarkOut, cell_out, number, remarks_out

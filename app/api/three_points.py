@@ -7,13 +7,13 @@ from fastapi import APIRouter
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field, FiniteFloat
 
-from app.api.dependencies import AnyoneDep, SeatDep, ServicesDep
+from app.api.dependencies import AnyoneDep, LiveSessionDep, ServicesDep
 from app.api.pointing import PixelPoint, ViewPoint, target_of, viewpoint_of
 from app.api.problems import InputError
 from app.api.registration_state import RegistrationOut, registration_out
-from app.labeling.seat import Seat
-from app.scene_data import SceneData
-from registration_core.correspondence import Correspondence, pose_from_correspondences
+from app.datasets.scene_data import SceneData
+from app.labeling.live.live_session import LiveSession
+from registration_core.geometry.correspondence import Correspondence, pose_from_correspondences
 
 router = APIRouter(prefix="/api/registrations", tags=["three points"])
 
@@ -66,19 +66,19 @@ class ThreePointsOut(BaseModel):
 
 @router.post("/{registration_id}/three-points")
 def three_points(
-    body: PointPairs, seat: SeatDep, services: ServicesDep, identity: AnyoneDep
+    body: PointPairs, live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep
 ) -> ThreePointsOut:
     """Put the object where the pairs agree best; where the task has a machine, it snaps from there."""
     on_object = np.array([pair.on_object for pair in body.pairs])
-    in_world = np.array([_in_world(pair, seat, services.data) for pair in body.pairs])
-    fit = _fit(on_object, in_world, seat.model.centre)
+    in_world = np.array([_in_world(pair, live_session, services.data) for pair in body.pairs])
+    fit = _fit(on_object, in_world, live_session.model.centre)
     detail = _detail(on_object, in_world, fit)
-    seat.session.set_pose(fit.T_camera_object, identity.actor, "three points", detail)
+    live_session.session.set_pose(fit.T_camera_object, identity.actor, "three points", detail)
     snap_id = None
-    if "snap" in seat.session.tools:
-        snap_id = seat.session.snap(identity.actor, start_spread=fit.start_spread)
+    if "snap" in live_session.session.tools:
+        snap_id = live_session.session.snap(identity.actor, start_spread=fit.start_spread)
     return ThreePointsOut(
-        registration=registration_out(seat),
+        registration=registration_out(live_session),
         residuals=fit.residuals.tolist(),
         rms=fit.rms,
         start_spread=fit.start_spread,
@@ -87,23 +87,23 @@ def three_points(
 
 
 @router.post("/{registration_id}/point")
-def point(body: PixelPoint | ViewPoint, seat: SeatDep, services: ServicesDep) -> PointOut:
+def point(body: PixelPoint | ViewPoint, live_session: LiveSessionDep, services: ServicesDep) -> PointOut:
     """The measured point that somebody points at; nothing changes."""
-    return PointOut(point_world=tuple(target_of(body, seat, services.data).point))
+    return PointOut(point_world=tuple(target_of(body, live_session, services.data).point))
 
 
 @router.put("/{registration_id}/marks", status_code=204)
-def mark(body: Marks, seat: SeatDep) -> None:
+def mark(body: Marks, live_session: LiveSessionDep) -> None:
     """Number points in the operator's 3-D view."""
-    viewpoint_of(seat)
-    assert seat.view is not None
-    seat.view.mark([np.array(position) for position in body.points_world])
+    viewpoint_of(live_session)
+    assert live_session.view is not None
+    live_session.view.mark([np.array(position) for position in body.points_world])
 
 
-def _in_world(pair: PointPair, seat: Seat, data: SceneData) -> Array:
+def _in_world(pair: PointPair, live_session: LiveSession, data: SceneData) -> Array:
     if isinstance(pair.in_scene, tuple):
         return np.array(pair.in_scene)
-    return target_of(pair.in_scene, seat, data).point
+    return target_of(pair.in_scene, live_session, data).point
 
 
 def _fit(on_object: Array, in_world: Array, centre: Array) -> Correspondence:

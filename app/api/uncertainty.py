@@ -3,9 +3,9 @@
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
-from app.api.dependencies import SeatDep, ServicesDep
-from app.labeling.ambiguity_words import Kind, Motion, names_of_drawn, sentence
-from app.labeling.track import ActionError
+from app.api.dependencies import LiveSessionDep, ServicesDep
+from app.confidence.ambiguity_words import Kind, Motion, names_of_drawn, sentence
+from app.labeling.moves.pose_record import ActionError
 
 router = APIRouter(prefix="/api/registrations", tags=["uncertainty"])
 
@@ -38,10 +38,10 @@ class Shown(BaseModel):
 
 
 @router.get("/{registration_id}/uncertainty")
-def get_uncertainty(seat: SeatDep, services: ServicesDep) -> UncertaintyOut:
+def get_uncertainty(live_session: LiveSessionDep, services: ServicesDep) -> UncertaintyOut:
     """How far off the present pose may be, and what depth does not tell about it."""
-    snap_id = seat.session.snapshot().estimate_snap_id
-    known = services.desk.uncertainty(seat, snap_id)
+    snap_id = live_session.session.snapshot().estimate_snap_id
+    known = services.live_sessions.uncertainty(live_session, snap_id)
     if known is None:
         return UncertaintyOut(snap_id=None, translation=None, rotation=None, unknown=[])
     unknown = [
@@ -60,8 +60,8 @@ def get_uncertainty(seat: SeatDep, services: ServicesDep) -> UncertaintyOut:
 
 
 @router.put("/{registration_id}/uncertainty", status_code=204)
-def show_uncertainty(body: Shown, seat: SeatDep) -> None:
+def show_uncertainty(body: Shown, live_session: LiveSessionDep) -> None:
     """Show it in the operator's 3-D view, or hide it there."""
-    if seat.view is None:
+    if live_session.view is None:
         raise ActionError("Nobody has the 3-D view of this registration open.")
-    seat.view.uncertainty.visible = body.shown
+    live_session.view.uncertainty.visible = body.shown

@@ -8,10 +8,10 @@ import sys
 import threading
 
 from app.config import Settings
-from app.database import Database
+from app.export.content.selection import ExportError
 from app.export.job import run_job
-from app.export.selection import ExportError
-from app.stored_files import open_store
+from app.storage.database import Database
+from app.storage.named_files import open_store
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -14,20 +14,20 @@ from typing import Any
 from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
-from app.database import Database
 from app.export.archive import pack
-from app.export.bop_dataset import ModelCache, write_dataset
-from app.export.failure_picture import failure_picture
-from app.export.gate import Failure, ObjectsError, check_export, expected_images
-from app.export.gate_instance import GateError
-from app.export.interaction_log import write_interaction_log
-from app.export.results_csv import write_results
-from app.export.selection import EVERYTHING, Choice, ExportError, Selection, select_dataset
-from app.storage import DamagedFileError, FileStore
-from app.storage_faults import advice
-from app.tables import NAMED, Export, Format, Registration
-from app.unfinished import unfinished
-from registration_core import pose
+from app.export.content.selection import EVERYTHING, Choice, ExportError, Selection, select_dataset
+from app.export.formats.bop import ModelCache, write_dataset
+from app.export.formats.interaction_log import write_interaction_log
+from app.export.formats.results_csv import write_results
+from app.export.gate.checks import Failure, ObjectsError, check_export, expected_images
+from app.export.gate.failure_picture import failure_picture
+from app.export.gate.instance import GateError
+from app.storage.database import Database
+from app.storage.faults import advice
+from app.storage.files import DamagedFileError, FileStore
+from app.storage.tables import NAMED, Export, Format, Registration
+from app.storage.unfinished import unfinished
+from registration_core.geometry import pose
 
 log = logging.getLogger(__name__)
 

@@ -11,22 +11,16 @@ from contextlib import ExitStack
 import numpy as np
 from numpy.typing import NDArray
 
-from app.auth import Actor
-from app.event_log import STATE_AFTER, NewEvent
-from app.labeling.camera_watch import Camera
-from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.hand import Hand
-from app.labeling.history import History, Step
 from app.labeling.layers import Layers
-from app.labeling.machine import Machine
-from app.labeling.same_pose import SamePose
-from app.labeling.search import Region, RequestSearch, Search
-from app.labeling.session_state import SessionState
-from app.labeling.snap_exchange import ChooseFrames, KnownObject, RequestSnap, Wanted
-from app.labeling.start_spread import StartSpread, Unsaid
-from app.labeling.tools import (
+from app.labeling.moves.camera_watch import Camera
+from app.labeling.moves.degrees_of_freedom import GizmoAxes
+from app.labeling.moves.history import History, Step
+from app.labeling.moves.operator_actions import OperatorActions
+from app.labeling.moves.pose_record import ActionError, PoseRecord, RecordEvent
+from app.labeling.permissions import (
     TOOL_OF,
     Tool,
+    Wanted,
     frame_uses_of,
     methods_of,
     require,
@@ -34,11 +28,19 @@ from app.labeling.tools import (
     require_method,
     tools_of,
 )
-from app.labeling.track import ActionError, RecordEvent, Track
-from app.labeling.turns import Turns
-from app.methods import config_of
-from app.tables import Condition, FrameUse, Method
+from app.labeling.scene.known_object import KnownObject
+from app.labeling.session_lock import SessionLock
+from app.labeling.session_state import SessionState
+from app.labeling.snaps.find import Region, RequestSearch, Search
+from app.labeling.snaps.machine import Machine
+from app.labeling.snaps.snap_exchange import ChooseFrames, RequestSnap
+from app.labeling.snaps.start_spread import StartSpread, Unsaid
+from app.storage.event_log import STATE_AFTER, NewEvent
+from app.storage.roles import Actor
+from app.storage.tables import Condition, FrameUse, Method
+from app.workers.methods import config_of
 from registration_core import SnapConfig
+from registration_core.symmetry.pose_equivalence import SamePose
 
 Array = NDArray[np.float64]
 
@@ -99,28 +101,28 @@ class LabelingSession:
         self._state = state
         self._skip_reason = skip_reason
         self._frame_ids = tuple(frame_ids)
-        self._turns = turns = Turns(lambda: self._machine.follow(self._is_open), self.snapshot)
-        self._track = Track(history, frame_id, pivot, record_event)
-        self._hand = Hand(self._track, now)
+        self._lock = lock = SessionLock(lambda: self._machine.follow(self._is_open), self.snapshot)
+        self._record = PoseRecord(history, frame_id, pivot, record_event)
+        self._operator = OperatorActions(self._record, now)
         self._machine = Machine(
             registration_id,
-            self._track,
+            self._record,
             self.tools,
             self.methods,
             self.frame_uses,
             condition == "auto",
             same_pose,
             lambda order, on_progress, on_end: request_snap(
-                order, turns.report(on_progress), turns.report(on_end)
+                order, lock.report(on_progress), lock.report(on_end)
             ),
             choose_frames,
             known_objects,
         )
         self._search = Search(
-            self._track,
+            self._record,
             self.tools,
             lambda order, on_progress, on_end: request_search(
-                order, turns.report(on_progress), turns.report(on_end)
+                order, lock.report(on_progress), lock.report(on_end)
             ),
             known_objects,
         )
@@ -137,22 +139,22 @@ class LabelingSession:
 
     def snapshot(self) -> SessionState:
         """The present state."""
-        with self._turns.alone:
-            track, history = self._track, self._track.history
+        with self._lock.held:
+            record, history = self._record, self._record.history
             return SessionState(
                 registration_id=self.registration_id,
-                revision=self._turns.revision,
+                revision=self._lock.revision,
                 state=self._state,
                 skip_reason=self._skip_reason,
-                frame_id=track.frame_id,
-                T_world_object=track.T_world_object,
-                confidence=None if track.drag else history.current.confidence,
-                assessment=None if track.drag else history.current.assessment,
-                posed_by="human" if track.drag else history.current.posed_by,
+                frame_id=record.frame_id,
+                T_world_object=record.T_world_object,
+                confidence=None if record.drag else history.current.confidence,
+                assessment=None if record.drag else history.current.assessment,
+                posed_by="human" if record.drag else history.current.posed_by,
                 can_undo=self._is_open and history.can_undo,
                 can_redo=self._is_open and history.can_redo,
-                dragging=track.drag is not None,
-                gizmo_axes=self._hand.axes,
+                dragging=record.drag is not None,
+                gizmo_axes=self._operator.axes,
                 layers=self._layers,
                 snap=self._machine.status,
                 offer=self._machine.offer,
@@ -160,10 +162,10 @@ class LabelingSession:
                 frame_use=self._machine.frame_use,
                 is_live=self._machine.is_live,
                 live=self._machine.live,
-                estimate_snap_id=None if track.drag else history.current.snap_id,
+                estimate_snap_id=None if record.drag else history.current.snap_id,
                 search=self._search.status,
                 preview=self._shown_preview(),
-                message=track.message,
+                message=record.message,
             )
 
     def subscribe(self, listener: Callable[[SessionState], None]) -> Callable[[], None]:
@@ -172,28 +174,28 @@ class LabelingSession:
         Returns:
             A function that ends the subscription.
         """
-        return self._turns.subscribe(listener)
+        return self._lock.subscribe(listener)
 
     @property
     def last_used(self) -> float:
         """When anything changed last, seconds of the monotonic clock."""
-        return self._turns.last_used
+        return self._lock.last_used
 
     # -- the operator's hand -----------------------------------------------------------------------
 
     def start_drag(self) -> None:
         """The operator took hold of the gizmo."""
-        with self._turns.alone:
+        with self._lock.held:
             if self._is_open:
-                self._hand.take()
-                self._turns.tell()
+                self._operator.take()
+                self._lock.notify()
 
     def drag_to(self, T_world_object: Array) -> None:
         """The gizmo is here now; nothing is written before it is let go."""
-        with self._turns.alone:
-            if self._track.drag is not None:
-                self._track.drag.move(T_world_object)
-                self._turns.tell()
+        with self._lock.held:
+            if self._record.drag is not None:
+                self._record.drag.move(T_world_object)
+                self._lock.notify()
 
     def end_drag(self, broken: bool = False) -> None:
         """The operator let go: the drag is written down; where that fails, it is taken back and said so.
@@ -201,10 +203,10 @@ class LabelingSession:
         In `auto` the machine has its turn then. A drag that was `broken`, by a lost connection, is kept as
         far as it came, which is said, and is no sign to the machine.
         """
-        with self._turns.attempt():
+        with self._lock.attempt():
             moved = self._let_go()
             if moved and broken:
-                self._track.message = BROKEN_DRAG
+                self._record.message = BROKEN_DRAG
             elif moved:
                 self._machine.take_turn()
 
@@ -223,65 +225,65 @@ class LabelingSession:
             technique: How the pose was found, for the log.
             detail: What the technique found it from, for the log, as JSON.
         """
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
             self._put(T_world_object, actor, technique, detail or {})
 
     def move(self, change: Callable[[Array], Array], actor: Actor, technique: str) -> None:
         """Put the object where `change` leads from its present pose; nothing comes between the two."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
-            self._put(change(self._track.history.current.T_world_object), actor, technique, {})
+            self._put(change(self._record.history.current.T_world_object), actor, technique, {})
 
     def align_gizmo(self, axes: GizmoAxes) -> None:
         """Let the gizmo's arrows lie along other axes; each drag is logged with those that it had."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
-            self._hand.axes = axes
+            self._operator.axes = axes
 
     def show_layers(self, layers: Layers) -> None:
         """Let the view show these; that moves nothing, and may be done at any time."""
-        with self._turns.change():
+        with self._lock.change():
             if layers.agreement:
                 require(self.tools, "agreement")
             self._layers = layers
 
     def reset(self, actor: Actor) -> None:
         """Put the object back to where it began; this can be undone."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
-            self._hand.reset(actor)
+            self._operator.reset(actor)
             self._put_found_away()
 
     def undo(self, actor: Actor) -> None:
         """Take the last change of pose back, whoever made it."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
-            self._hand.undo(actor)
+            self._operator.undo(actor)
 
     def redo(self, actor: Actor) -> None:
         """Bring back what was undone last."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
-            self._hand.redo(actor)
+            self._operator.redo(actor)
 
     def show_frame(self, frame_id: int, actor: Actor) -> None:
         """Show, and snap against, another frame of the scene."""
-        with self._turns.change():
+        with self._lock.change():
             if frame_id not in self._frame_ids:
                 raise ActionError(f"Frame {frame_id} does not belong to this scene.")
-            self._track.record(NewEvent(kind="frame", actor=actor, detail={"frame_id": frame_id}))
-            self._track.frame_id = frame_id
+            self._record.record(NewEvent(kind="frame", actor=actor, detail={"frame_id": frame_id}))
+            self._record.frame_id = frame_id
 
     def look_from(self, camera: Camera, seconds: float) -> None:
         """The operator turned the view, within the last `seconds`. Without the lock: no drag waits for it."""
         if self._is_open:
             event = NewEvent("view", Actor.HUMAN, duration_seconds=seconds, detail=dict(camera))
-            self._track.record(event)
+            self._record.record(event)
 
     def submit(self, actor: Actor) -> None:
         """Finish the registration with the present pose."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
             self._machine.abandon(actor, "submitted")
             self._search.abandon(actor, "submitted")
@@ -289,7 +291,7 @@ class LabelingSession:
 
     def skip(self, actor: Actor, reason: str) -> None:
         """Finish the registration without a pose, saying why."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
             require(self.tools, "ending")
             self._machine.abandon(actor, "skipped")
@@ -298,7 +300,7 @@ class LabelingSession:
 
     def reopen(self, actor: Actor) -> None:
         """Go on with a registration that was submitted or skipped; undo and redo are as they were."""
-        with self._turns.change():
+        with self._lock.change():
             if self._is_open:
                 raise ActionError("This registration is open.")
             require(self.tools, "ending")
@@ -326,33 +328,33 @@ class LabelingSession:
         Returns:
             The snap's id.
         """
-        with self._turns.change():
+        with self._lock.change():
             self._require_open()
             self._require_frames_of_scene(frames)
             return self._machine.snap(actor, config or config_of(self._method), seed, start_spread, frames)
 
     def choose_frames(self, choice: FrameUse) -> None:
         """Let Snap use these frames from now on, where it is not asked otherwise. That moves nothing."""
-        with self._turns.change():
+        with self._lock.change():
             require(self.tools, "snap")
             require_frames(self.frame_uses, choice)
             self._machine.frame_use = choice
 
     def choose_method(self, method: Method) -> None:
         """Let Snap compute with this from now on, where it is not asked otherwise. That moves nothing."""
-        with self._turns.change():
+        with self._lock.change():
             require(self.tools, "snap")
             require_method(self.methods, method)
             self._method = method
 
     def cancel_snap(self, actor: Actor) -> None:
         """Stop the snap that is under way; nothing happens where there is none."""
-        with self._turns.change():
+        with self._lock.change():
             self._machine.abandon(actor, "cancelled by request")
 
     def accept(self, actor: Actor) -> None:
         """Take the pose that the machine offers, or shows live; this one even out of the operator's hand."""
-        with self._turns.change():
+        with self._lock.change():
             if self._machine.live is not None:
                 self._let_go()
             self._require_free_hands()
@@ -360,7 +362,7 @@ class LabelingSession:
 
     def set_live(self, on: bool, actor: Actor) -> None:
         """Turn live snapping on or off."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_open()
             self._machine.set_live(on, actor)
 
@@ -382,7 +384,7 @@ class LabelingSession:
         Returns:
             The search's id.
         """
-        with self._turns.change():
+        with self._lock.change():
             self._require_open()
             search_id = self._search.start(actor, region, config or SnapConfig(), seed)
             self._preview = None
@@ -390,36 +392,36 @@ class LabelingSession:
 
     def leave_search(self, actor: Actor) -> None:
         """Cancel the search that is under way, or put its candidates away."""
-        with self._turns.change():
+        with self._lock.change():
             self._search.abandon(actor, "cancelled by request")
             self._search.put_away()
             self._preview = None
 
     def preview(self, T_world_object: Array | None) -> None:
         """Show a pose as a ghost, until the object moves or another one is shown; None shows nothing."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_free_hands()
             require(self.tools, "snap")
-            now = self._track.history.current
+            now = self._record.history.current
             self._preview = None if T_world_object is None else (now, T_world_object)
 
     def dismiss(self, actor: Actor) -> None:
         """Decline the pose that the machine offers."""
-        with self._turns.change():
+        with self._lock.change():
             self._require_open()
             self._machine.dismiss(actor)
 
     def close(self) -> None:
         """End the session, cancelling a snap under way. What was recorded stays, and can be gone on with."""
-        with self._turns.alone, ExitStack() as ends:  # each of them, whatever becomes of the others
-            ends.callback(self._turns.end)
+        with self._lock.held, ExitStack() as ends:  # each of them, whatever becomes of the others
+            ends.callback(self._lock.end)
             ends.callback(self._search.abandon, Actor.MACHINE, "session closed")
             ends.callback(self._machine.close)
 
     def tell(self) -> None:
         """Tell the listeners the state once more: something beside it has changed."""
-        with self._turns.alone:
-            self._turns.tell()
+        with self._lock.held:
+            self._lock.notify()
 
     # -- helpers -----------------------------------------------------------------------------------
 
@@ -439,19 +441,19 @@ class LabelingSession:
 
     def _require_free_hands(self) -> None:
         self._require_open()
-        if self._track.drag is not None:
+        if self._record.drag is not None:
             raise ActionError("The object is being dragged; let go of it first.")
 
     def _change_state(self, kind: str, actor: Actor, reason: str | None = None) -> None:
-        T = self._track.history.current.T_world_object.tolist()
+        T = self._record.history.current.T_world_object.tolist()
         detail = {} if reason is None else {"reason": reason}
-        self._track.record(NewEvent(kind=kind, actor=actor, T_before=T, T_after=T, detail=detail))
+        self._record.record(NewEvent(kind=kind, actor=actor, T_before=T, T_after=T, detail=detail))
         self._state, self._skip_reason = STATE_AFTER[kind], reason
         self._machine.offer = None
         self._search.put_away()
 
     def _let_go(self) -> bool:
-        moved = self._hand.let_go()
+        moved = self._operator.let_go()
         if moved:
             self._put_found_away()
         return moved
@@ -461,7 +463,7 @@ class LabelingSession:
     ) -> None:
         require(self.tools, TOOL_OF.get(technique, "precision"))
         named = {} if technique is None else {"technique": technique}
-        self._hand.put(T_world_object, actor, {**named, **detail})
+        self._operator.put(T_world_object, actor, {**named, **detail})
         self._put_found_away()
 
     def _put_found_away(self) -> None:
@@ -470,7 +472,7 @@ class LabelingSession:
         self._search.put_away()
 
     def _shown_preview(self) -> Array | None:
-        if self._preview is None or self._track.drag is not None or not self._is_open:
+        if self._preview is None or self._record.drag is not None or not self._is_open:
             return None
         looked_at_from, T_world_object = self._preview
-        return T_world_object if looked_at_from is self._track.history.current else None
+        return T_world_object if looked_at_from is self._record.history.current else None

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.labeling.assessment import Assessment
-from app.labeling.degrees_of_freedom import GizmoAxes
-from app.labeling.history import PosedBy
+from app.confidence.assessment import Assessment
 from app.labeling.layers import Layers
-from app.labeling.snap_exchange import Offer, SnapStatus
-from app.tables import FrameUse, Method
+from app.labeling.moves.degrees_of_freedom import GizmoAxes
+from app.labeling.moves.history import PosedBy
+from app.labeling.snaps.snap_exchange import Offer, SnapStatus
+from app.storage.tables import FrameUse, Method
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from app.analysis.trace import LoggedEvent, Span, Trace, moves, trace_of
-from app.clock import SIMULATED
-from app.labeling.assessment import Assessment, assessment_in
-from app.labeling.history import PosedBy, after, start
-from app.labeling.viewpoint import Viewpoint, facing
-from app.tables import Pose
+from app.analysis.trace.trace import LoggedEvent, Span, Trace, moves, trace_of
+from app.confidence.assessment import Assessment, assessment_in
+from app.labeling.moves.history import PosedBy, after, start
+from app.labeling.moves.viewpoint import Viewpoint, facing
+from app.storage.clock import SIMULATED
+from app.storage.tables import Pose
 
 Array = NDArray[np.float64]
 Value = TypeVar("Value")

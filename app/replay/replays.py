@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from app.analysis.trace import until_submission
-from app.database import Database
-from app.event_log import EventLog
-from app.labeling.desk import NotFoundError
-from app.labeling.frame_view import first_view_of, show_cloud_of
-from app.labeling.view import DragHandlers, SceneView
-from app.registration_rows import whole_registration
+from app.analysis.trace.trace import until_submission
+from app.datasets.scene_data import SceneData
+from app.labeling.live.sessions import NotFoundError
 from app.replay.recording import Moment, Recording
-from app.scene_data import SceneData
-from app.tables import Frame, Registration
+from app.storage.database import Database
+from app.storage.event_log import EventLog
+from app.storage.registration_rows import whole_registration
+from app.storage.tables import Frame, Registration
+from app.views3d.frame_view import first_view_of, show_cloud_of
+from app.views3d.view import DragHandlers, SceneView
 from registration_core import ObjectModel
 
 IDLE_SECONDS = 120

@@ -5,9 +5,9 @@ import io
 
 from sqlalchemy import select
 
-from app.database import Database
+from app.storage.database import Database
+from app.storage.tables import Participant
 from app.study.plan import DECLINED
-from app.tables import Participant
 
 COLUMNS = ("code", "group", "is_simulated", "question", "answer", "status")
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from sqlalchemy import delete, select, text
 from sqlalchemy.orm import Session
 
-from app.tables import EstimateRow, Event, OfflineSnap, Registration
+from app.storage.tables import EstimateRow, Event, OfflineSnap, Registration
 
 APPEND_ONLY = (EstimateRow, Event)
 

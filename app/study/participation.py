@@ -6,10 +6,10 @@ from typing import Literal
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session, joinedload, selectinload
 
-from app.database import Database
+from app.storage.database import Database
+from app.storage.tables import Participant, Registration, Task, Trial
 from app.study.plan import StudyError, StudyPlan
 from app.study.studies import require_taking_part
-from app.tables import Participant, Registration, Task, Trial
 
 ScreenKind = Literal["consent", "questions", "practice", "break", "instructions", "task", "thanks"]
 

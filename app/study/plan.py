@@ -17,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from app.tables import Condition, Mode
+from app.storage.tables import Condition, Mode
 
 Item = TypeVar("Item")
 

@@ -7,13 +7,14 @@ from itertools import product
 from sqlalchemy import delete, func, select
 from sqlalchemy.orm import Session, joinedload
 
-from app.auth import Role, add_credential
-from app.database import Database
-from app.scene_data import SceneData
+from app.access.auth import add_credential
+from app.datasets.scene_data import SceneData
+from app.storage.database import Database
+from app.storage.roles import Role
+from app.storage.tables import Credential, Participant, Registration, Study, Trial, User, utc_now
 from app.study.erasing import erase_registrations
 from app.study.plan import Slot, StudyError, StudyPlan, order_of
 from app.study.tasks import ensure_task, find_task, start_of
-from app.tables import Credential, Participant, Registration, Study, Trial, User, utc_now
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session, selectinload
 
-from app.database import Database
-from app.labeling.tools import methods_of
-from app.scene_data import SceneData, camera_of
-from app.start_pose import start_pose
+from app.datasets.scene_data import SceneData, camera_of
+from app.datasets.start_pose import start_pose
+from app.labeling.permissions import methods_of
+from app.storage.database import Database
+from app.storage.tables import Object, Pose, Scene, Task
 from app.study.plan import Slot, StudyError, TaskRef
-from app.tables import Object, Pose, Scene, Task
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from scipy.stats import spearmanr
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
 from registration_core import SnapConfig
-from registration_core.agreement import agreement_weights, sparse_agreement, surface_of
-from registration_core.evidence import evidence
-from registration_core.kernels import f4, to_rows
-from registration_core.observation import observe
-from registration_core.particle_filter import Noise, initial_poses
-from registration_core.problem import checked_problem
-from registration_core.selection import scores
-from registration_core.snap_config import AgreementConfig
+from registration_core.config import AgreementConfig
+from registration_core.geometry.kernels import f4, to_rows
+from registration_core.judge.pixel_evidence import evidence
+from registration_core.judge.selection import scores
+from registration_core.paper.particle_filter import Noise, initial_poses
+from registration_core.search.observation import observe
+from registration_core.search.snap_input import checked_problem
+from registration_core.search.sparse_score import agreement_weights, sparse_score, surface_of
 
 POSES, BEST = 1000, 0.01
 """About each true pose, and the share of them that counts as the best by the sparse agreement."""
@@ -75,7 +75,7 @@ def rankings(instance: Instance, spread: Shell) -> list[Ranking]:
     exact = scores(counts, np.zeros(POSES), CONFIG.selection)
     surface, sparse, found = surface_of(model), np.empty(POSES, np.float32), []
     for points, ring_share, epsilon, with_normals, softening in WEIGHINGS.values():
-        sparse_agreement(
+        sparse_score(
             poses, surface, grid, problem.prior, points, int(ring_share * surface.ring.shape[2]), f4(epsilon),
             with_normals, agreement_weights(CONFIG.agreement, softening), sparse,
         )  # fmt: skip

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.registration.instances import Instance
-from registration_core.rasterizer import render_depth
+from registration_core.rendering.rasterizer import render_depth
 
 DepthImage = NDArray[np.float32]
 

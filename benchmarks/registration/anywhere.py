@@ -11,7 +11,7 @@ from benchmarks.registration.judging import Judge
 from benchmarks.registration.methods import polished_truth, warmed_up
 from benchmarks.registration.trials import single_threaded_pool
 from registration_core import propose
-from registration_core.rasterizer import render_depth
+from registration_core.rendering.rasterizer import render_depth
 
 FOUND, SECONDS = Target(95.0, at_least=True), Target(1.0)
 FIRST = 5

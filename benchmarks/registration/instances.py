@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from benchmarks.registration.objects import APC_BOX, DATA, known_objects, with_symmetries, ycb_object
 from benchmarks.registration.starts import is_in_view
-from registration_core import Intrinsics, ObjectModel, color_is_aligned, pose
-from registration_core.bop import BopObject, read_color, read_dataset, read_depth
-from registration_core.mesh_error import imprecise
-from registration_core.sensor_families import DEMO, FAMILIES, draw_sensor, measure
-from registration_core.synthetic_scene import View, make_scene
-from registration_core.tabletop import Layout
+from registration_core import Intrinsics, ObjectModel, color_is_aligned
+from registration_core.bop.dataset import BopObject, read_color, read_dataset, read_depth
+from registration_core.geometry import pose
+from registration_core.synthetic.mesh_error import imprecise
+from registration_core.synthetic.scene import View, make_scene
+from registration_core.synthetic.sensor_families import DEMO, FAMILIES, draw_sensor, measure
+from registration_core.synthetic.tabletop import Layout
 
 Array = NDArray[np.float64]
 

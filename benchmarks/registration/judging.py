@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from registration_core import ObjectModel, pose, pose_error
+from registration_core import ObjectModel
+from registration_core.geometry import pose, pose_error
 
 Array = NDArray[np.float64]
 

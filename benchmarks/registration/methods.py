@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 from benchmarks.registration import peers, prototype
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
-from registration_core import SnapConfig, pose, snap, warm_up
-from registration_core.kernels import from_rows, to_rows
-from registration_core.problem import checked_problem
-from registration_core.search import search_of
-from registration_core.selection import match_shares, shown_shares
-from registration_core.snap_config import ParticleFilterConfig
+from registration_core import SnapConfig, snap, warm_up
+from registration_core.config import ParticleFilterConfig
+from registration_core.geometry import pose
+from registration_core.geometry.kernels import from_rows, to_rows
+from registration_core.judge.selection import match_shares, shown_shares
+from registration_core.search.snap_input import checked_problem
 from registration_core.snap_run import Sighting, SnapRun
 from registration_core.verdict import judged
+from registration_core.view_search import search_of
 
 Array = NDArray[np.float64]
 

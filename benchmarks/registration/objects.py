@@ -8,9 +8,10 @@ import trimesh
 from numpy.typing import NDArray
 
 from app.config import PROJECT
-from registration_core import ObjectModel, Symmetries, pose
-from registration_core.object_model import ContinuousSymmetry, discrete
-from registration_core.procedural_objects import demo_objects
+from registration_core import ObjectModel, Symmetries
+from registration_core.geometry import pose
+from registration_core.geometry.object_model import ContinuousSymmetry, discrete
+from registration_core.synthetic.objects import demo_objects
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from scipy.ndimage import binary_dilation
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.methods import DEFAULT, Opinion, opinion
 from benchmarks.registration.trials import Trial
-from registration_core.bop import read_color
-from registration_core.rasterizer import render_depth
+from registration_core.bop.dataset import read_color
+from registration_core.rendering.rasterizer import render_depth
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.starts import Shell
-from registration_core import SnapConfig, pose, region_of_interest
-from registration_core.camera import Intrinsics, depth_to_points
-from registration_core.rasterizer import render_depth
+from registration_core import SnapConfig, region_of_interest
+from registration_core.geometry import pose
+from registration_core.geometry.camera import Intrinsics, depth_to_points
+from registration_core.rendering.rasterizer import render_depth
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from app.config import PROJECT
 from benchmarks.registration.instances import Instance
-from registration_core import ObjectModel, pose
+from registration_core import ObjectModel
+from registration_core.geometry import pose
 
 Array = NDArray[np.float64]
 

@@ -20,12 +20,12 @@ from benchmarks.figures import Figure, Target
 from benchmarks.registration.objects import DATA, known_objects, read_model
 from benchmarks.registration.residuals import HIDDEN, Residuals, residuals
 from registration_core import Intrinsics, ObjectModel
-from registration_core.bop import read_dataset, read_depth
-from registration_core.mesh_error import imprecise
-from registration_core.rasterizer import render_depth
-from registration_core.sensor_families import FAMILIES, SensorFamily, draw_sensor, measure
-from registration_core.synthetic_scene import make_scene
-from registration_core.tabletop import Layout
+from registration_core.bop.dataset import read_dataset, read_depth
+from registration_core.rendering.rasterizer import render_depth
+from registration_core.synthetic.mesh_error import imprecise
+from registration_core.synthetic.scene import make_scene
+from registration_core.synthetic.sensor_families import FAMILIES, SensorFamily, draw_sensor, measure
+from registration_core.synthetic.tabletop import Layout
 
 TITLE = "Sensors: how much of what real sets show lies within what their kind of sensor draws"
 

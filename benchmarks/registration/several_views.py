@@ -12,11 +12,12 @@ from benchmarks.registration.instances import BUNNY, Instance, real_instances
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.starts import FARTHEST, MIDDLE, Shell, starts
 from benchmarks.registration.trials import single_threaded_pool
-from registration_core import pose, snap_views
-from registration_core.procedural_objects import demo_objects
-from registration_core.sensor_families import FAMILIES, SensorFamily
-from registration_core.synthetic_scene import make_scene
-from registration_core.tabletop import Layout
+from registration_core import snap_views
+from registration_core.geometry import pose
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import make_scene
+from registration_core.synthetic.sensor_families import FAMILIES, SensorFamily
+from registration_core.synthetic.tabletop import Layout
 
 Array = NDArray[np.float64]
 

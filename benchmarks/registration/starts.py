@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core import Intrinsics, ObjectModel, pose
-from registration_core.camera import project
+from registration_core import Intrinsics, ObjectModel
+from registration_core.geometry import pose
+from registration_core.geometry.camera import project
 
 Array = NDArray[np.float64]
 

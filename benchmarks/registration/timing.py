@@ -13,12 +13,12 @@ from benchmarks.registration.starts import SHELLS, starts
 from benchmarks.registration.statistics import percentiles
 from benchmarks.registration.trials import single_threaded_pool
 from registration_core import SnapConfig
-from registration_core.agreement import agreement_weights, sparse_agreement, surface_of
-from registration_core.kernels import f4, to_rows
-from registration_core.observation import observe
-from registration_core.particle_filter import Noise, initial_poses
-from registration_core.problem import checked_problem
-from registration_core.viewpoint_model import build_viewpoint_model
+from registration_core.geometry.kernels import f4, to_rows
+from registration_core.paper.particle_filter import Noise, initial_poses
+from registration_core.search.observation import observe
+from registration_core.search.snap_input import checked_problem
+from registration_core.search.sparse_score import agreement_weights, sparse_score, surface_of
+from registration_core.search.viewpoint_model import build_viewpoint_model
 
 MEDIAN, P95, SPARSE, PAPER_RUN = Target(15.0), Target(30.0), Target(0.2), Target(10.0)
 SPEEDUP = Target(40.0, at_least=True)
@@ -81,7 +81,7 @@ def _sparse_evaluations(instance: Instance) -> float:
     poses = to_rows(initial_poses(problem.start, spread, EVALUATIONS, rng))
     surface, agreement = surface_of(problem.model), np.empty(EVALUATIONS, np.float32)
     began = time.perf_counter()
-    sparse_agreement(
+    sparse_score(
         poses, surface, observation.grid, problem.prior, config.wide_points, surface.ring.shape[2] // 4,
         f4(config.wide_epsilon), False, agreement_weights(config.agreement), agreement,
     )  # fmt: skip

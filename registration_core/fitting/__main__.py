@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from registration_core.config import SnapConfig
 from registration_core.fitted import PATH
 from registration_core.fitting import calibration, numbers
 from registration_core.fitting.replay import decisions
 from registration_core.fitting.table import FeatureTable, read_table, table_of, with_decisions
 from registration_core.fitting.trials import all_trials
-from registration_core.snap_config import SnapConfig
 
 SEED, SCENES = 0, 800
 

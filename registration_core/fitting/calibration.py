@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit
 
-from registration_core.confidence import FEATURES
+from registration_core.judge.confidence import FEATURES
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

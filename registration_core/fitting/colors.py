@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from registration_core.camera import Intrinsics, depth_to_points
 from registration_core.fitting.scenes import FIRST, SETTINGS, Picture
+from registration_core.geometry.camera import Intrinsics, depth_to_points
 
 Array = NDArray[np.float64]
 

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from registration_core import evidence
-from registration_core.confidence import FEATURES, features
+from registration_core.config import ALWAYS
 from registration_core.fitting import calibration
 from registration_core.fitting.ranking import Choice, Flags, best_ridge, fitted_weights, needless, where
 from registration_core.fitting.replay import TEMPERATURES
 from registration_core.fitting.table import FeatureTable, from_units
-from registration_core.snap_config import ALWAYS
+from registration_core.judge import pixel_evidence as evidence
+from registration_core.judge.confidence import FEATURES, features
 
 Array = NDArray[np.float64]
 

@@ -7,10 +7,10 @@ import trimesh
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from registration_core import pose
-from registration_core.object_model import Symmetries, discrete
-from registration_core.procedural_objects import AROUND_Z, ProceduralObject, centred
-from registration_core.procedural_shapes import (
+from registration_core.geometry import pose
+from registration_core.geometry.object_model import Symmetries, discrete
+from registration_core.synthetic.objects import AROUND_Z, ProceduralObject, centred
+from registration_core.synthetic.shapes import (
     arc,
     joined,
     moved,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from registration_core import evidence
-from registration_core.selection import match_shares
+from registration_core.judge import pixel_evidence as evidence
+from registration_core.judge.selection import match_shares
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core import selection
-from registration_core.confidence import belief_in_first, grouped
+from registration_core.config import ConfidenceConfig, SelectionConfig
 from registration_core.fitting.trials import Trial, told_model
-from registration_core.kernels import Array32
-from registration_core.snap_config import ConfidenceConfig, SelectionConfig
-from registration_core.viewpoint_model import ViewpointModel, viewpoint_model
+from registration_core.geometry.kernels import Array32
+from registration_core.judge import selection
+from registration_core.judge.confidence import belief_in_first, grouped
+from registration_core.search.viewpoint_model import ViewpointModel, viewpoint_model
 
 Array = NDArray[np.float64]
 

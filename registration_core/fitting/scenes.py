@@ -7,13 +7,13 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from registration_core import pose
-from registration_core.camera import Intrinsics
-from registration_core.object_model import ObjectModel
-from registration_core.procedural_objects import random_distractor
-from registration_core.rasterizer import render_depth
-from registration_core.synthetic_scene import Silhouette, table_model
-from registration_core.tabletop import Layout, Placed, cameras_around, place
+from registration_core.geometry import pose
+from registration_core.geometry.camera import Intrinsics
+from registration_core.geometry.object_model import ObjectModel
+from registration_core.rendering.rasterizer import render_depth
+from registration_core.synthetic.objects import random_distractor
+from registration_core.synthetic.scene import Silhouette, table_model
+from registration_core.synthetic.tabletop import Layout, Placed, cameras_around, place
 
 Array = NDArray[np.float64]
 DepthImage = NDArray[np.float32]

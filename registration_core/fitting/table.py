@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core import evidence
 from registration_core.fitting.ranking import Choice, fitted_weights, judged_features
 from registration_core.fitting.replay import TEMPERATURES, Decision
 from registration_core.fitting.trials import Trial
+from registration_core.judge import pixel_evidence as evidence
 
 Array = NDArray[np.float64]
 

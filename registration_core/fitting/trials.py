@@ -10,21 +10,21 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import NDArray
 
-from registration_core import pose
-from registration_core.agreement import heavy_tails
-from registration_core.camera import project
-from registration_core.confidence import EXACT
+from registration_core.config import SnapConfig
 from registration_core.fitting.colors import colored
 from registration_core.fitting.objects import KINDS, random_object
 from registration_core.fitting.scenes import SETTINGS, Picture, Seen, picture
-from registration_core.kernels import Array32, centred, from_rows, to_rows
-from registration_core.mesh_error import imprecise
-from registration_core.object_model import ObjectModel, Symmetries
-from registration_core.problem import checked_problem
-from registration_core.search import search_of
-from registration_core.sensor_families import FAMILIES, draw_sensor, measure
-from registration_core.snap_config import SnapConfig
+from registration_core.geometry import pose
+from registration_core.geometry.camera import project
+from registration_core.geometry.kernels import Array32, centred, from_rows, to_rows
+from registration_core.geometry.object_model import ObjectModel, Symmetries
+from registration_core.judge.confidence import EXACT
+from registration_core.search.snap_input import checked_problem
+from registration_core.search.sparse_score import heavy_tails
 from registration_core.snap_run import NEAR_ITERATIONS, NEAR_TUKEY, Sighting, SnapRun
+from registration_core.synthetic.mesh_error import imprecise
+from registration_core.synthetic.sensor_families import FAMILIES, draw_sensor, measure
+from registration_core.view_search import search_of
 
 Array = NDArray[np.float64]
 

@@ -12,16 +12,19 @@ import dask
 import httpx
 import pytest
 
-import app.cli
-from app.auth import Role
+import app.cli.commands
+from app.access.auth import Identity
 from app.config import Settings
-from app.database import Database
-from app.importing import import_dataset
+from app.datasets.importing import import_dataset
+from app.labeling.live.live_session import LiveSession
 from app.main import create_services
 from app.services import Services
-from app.snapping import start_workers
-from app.storage import FileStore
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.roles import Role
+from app.workers.pool import start_workers
 from tests.app import postgres
+from tests.app.labeling.live_sessions import sign_up
 from tests.app.live import LiveServer, running_server
 from tests.app.small_dataset import NAME, write_small_dataset
 from tests.processes import Command
@@ -32,7 +35,11 @@ for name in ("distributed", "bokeh"):
     logging.getLogger(name).propagate = True
 
 
-ON_BOTH_DATABASES = {f"tests.app.test_{name}" for name in ("auth", "event_log", "importing")}
+ON_BOTH_DATABASES = {
+    "tests.app.access.test_auth",
+    "tests.app.storage.test_event_log",
+    "tests.app.datasets.test_importing",
+}
 """Modules whose tests of a database run on SQLite and on PostgreSQL."""
 
 
@@ -131,7 +138,7 @@ def services(state_dir: Path, cluster: str) -> Iterator[Services]:
     """The parts of an application, without their port."""
     opened = create_services(settings_for(state_dir, cluster))
     yield opened
-    opened.desk.close()
+    opened.live_sessions.close()
     opened.replays.close()
     opened.export_jobs.close()
     opened.snapper.close()
@@ -177,8 +184,19 @@ def snap6d(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
                 patched.setenv(name, value)
             patched.setattr(sys, "argv", ["snap6d", *arguments])
             with pytest.raises(SystemExit) as ended:
-                app.cli.main()
+                app.cli.commands.main()
                 raise SystemExit(0)
         return CompletedProcess(arguments, ended.value.code or 0, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture
+def ann(services: Services) -> Identity:
+    return sign_up(services, "ann")
+
+
+@pytest.fixture
+def live_session(services: Services, ann: Identity) -> LiveSession:
+    """Ann before the first task: the angle tool of scene 1."""
+    return services.live_sessions.start(1, ann)

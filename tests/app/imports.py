@@ -2,10 +2,10 @@
 
 from sqlalchemy import select
 
-from app.database import Database
-from app.importing import ImportSummary
-from app.storage import FileStore
-from app.tables import Base
+from app.datasets.importing import ImportSummary
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.tables import Base
 
 
 def everything(database: Database, files: FileStore) -> tuple[list[str], set[str]]:

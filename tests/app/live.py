@@ -9,11 +9,11 @@ import httpx
 import uvicorn
 
 from app.api.dependencies import SESSION_COOKIE
-from app.auth import Role
-from app.connections import server_config
-from app.labeling.seat import Seat
+from app.labeling.live.live_session import LiveSession
 from app.main import create_app
 from app.services import Services
+from app.serving.connections import server_config
+from app.storage.roles import Role
 from tests.app.waiting import LONGEST, wait_until
 
 
@@ -57,9 +57,9 @@ class LiveServer:
         auth = self.services.auth
         return auth.sign_in_with_link(auth.create_link(auth.ensure_user(name, role).id))
 
-    def seat(self, registration_id: int) -> Seat:
+    def open(self, registration_id: int) -> LiveSession:
         """The live session of a registration."""
-        return self.services.desk._seats[registration_id]
+        return self.services.live_sessions._sessions[registration_id]
 
 
 @contextmanager

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from registration_core import pose
-from registration_core.bop_writer import (
+from registration_core.bop.writer import (
     camera_entry,
     gt_entry,
     model_info,
@@ -17,6 +16,7 @@ from registration_core.bop_writer import (
     write_json,
     write_mesh,
 )
+from registration_core.geometry import pose
 from tests.app.export.site import (
     BLOCK,
     CAMERA,

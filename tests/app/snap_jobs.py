@@ -9,11 +9,12 @@ from threading import Event
 
 import numpy as np
 
-from app.snapping import SnapError, Snapper
-from app.storage import PreparedStore
-from app.worker import JobResult, JobView, SnapJob
-from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, pose, snap
+from app.storage.files import PreparedStore
+from app.workers.jobs import JobResult, JobView, SnapJob
+from app.workers.pool import SnapError, Snapper
+from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap
 from registration_core.algorithm import VIEWPOINT_ALGORITHM
+from registration_core.geometry import pose
 from tests.app.export.site import CAMERA, NEAR_VIEW, T_WORLD_TOOL, TOOL, mesh_of, model_of, observed_depth
 from tests.app.waiting import LONGEST
 
@@ -116,8 +117,8 @@ def knowing(snapper: Snapper, digest: str) -> int:
     """How many workers know an object."""
 
     def knows() -> bool:
-        from app import worker
+        from app.workers import jobs
 
-        return digest in worker._objects
+        return digest in jobs._objects
 
     return sum(snapper._client.result().run(knows).values())

@@ -14,9 +14,9 @@ import pytest
 
 from app.api.dependencies import SESSION_COOKIE
 from app.config import Settings
-from app.export_jobs import INTERRUPTED
-from app.unfinished import PREFIX
-from registration_core import pose
+from app.export.processes import INTERRUPTED
+from app.storage.unfinished import PREFIX
+from registration_core.geometry import pose
 from tests.app.export.site import TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.rest import begin, log_of, put_pose

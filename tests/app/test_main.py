@@ -3,7 +3,7 @@
 import pytest
 
 from app.services import Services
-from app.unfinished import PREFIX, unfinished
+from app.storage.unfinished import PREFIX, unfinished
 from tests.app.live import running_server
 from tests.app.waiting import wait_until
 
@@ -33,7 +33,7 @@ def test_memory_is_given_back_once_the_threads_of_closed_views_have_ended(
 
     monkeypatch.setattr("app.main.SECONDS_BETWEEN_CLEANINGS", 0.01)
     monkeypatch.setattr("app.main.give_back", lambda: happened.append("given back"))
-    monkeypatch.setattr(services.desk, "close_idle", close_idle)
+    monkeypatch.setattr(services.live_sessions, "close_idle", close_idle)
     with running_server(services):
         wait_until(lambda: len(happened) >= 6, "some cleanings")
     assert happened[:6] == ["closed 0", "closed 2", "closed 0", "given back", "closed 0", "closed 0"]
@@ -49,6 +49,6 @@ def test_closing_of_idle_sessions_goes_on_after_it_failed(
         raise OSError("the disk is full")
 
     monkeypatch.setattr("app.main.SECONDS_BETWEEN_CLEANINGS", 0.01)
-    monkeypatch.setattr(services.desk, "close_idle", close_idle)
+    monkeypatch.setattr(services.live_sessions, "close_idle", close_idle)
     with running_server(services):
         wait_until(lambda: len(calls) >= 3, "further tries")

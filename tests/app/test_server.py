@@ -6,9 +6,9 @@ from pathlib import Path
 import httpx
 
 from app.config import Settings
-from app.database import Database
 from app.server import prepare_state
-from app.tables import Dataset, Task
+from app.storage.database import Database
+from app.storage.tables import Dataset, Task
 from tests.app.waiting import LONGEST, wait_until
 from tests.processes import command_line, descendants, failure, run_snap6d, serving
 

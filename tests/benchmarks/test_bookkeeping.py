@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.bookkeeping import Balance, compare_drags, compare_snaps
-from registration_core import pose
+from registration_core.geometry import pose
 
 A, B, C = (pose.exp([x, 0.0, 0.5, 0.0, 0.1, 0.0]) for x in (0.1, 0.2, 0.3))
 

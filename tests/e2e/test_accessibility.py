@@ -9,7 +9,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.database import Database
+from app.storage.database import Database
 from tests.app.analysis.hand_made import at
 from tests.app.analysis.hand_made_study import HandMadeStudy
 from tests.e2e.gizmo import view_frame

@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, expect
 
-from registration_core import Intrinsics, ObjectModel, pose
-from registration_core.rasterizer import render_depth
+from registration_core import Intrinsics, ObjectModel
+from registration_core.geometry import pose
+from registration_core.rendering.rasterizer import render_depth
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import wait_for_picture

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.tables import Condition
-from registration_core import pose
+from app.storage.tables import Condition
+from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import (
     Handle,

@@ -8,9 +8,10 @@ from playwright.sync_api import Page, expect
 from sqlalchemy import select
 
 from app.config import Settings
-from app.database import Database
-from app.tables import CalibrationRow, Condition, Dataset
-from registration_core import ALGORITHM, pose
+from app.storage.database import Database
+from app.storage.tables import CalibrationRow, Condition, Dataset
+from registration_core import ALGORITHM
+from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import pull, wait_for_picture
 from tests.e2e.test_labelling import Desk

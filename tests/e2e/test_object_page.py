@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from registration_core import pose
+from registration_core.geometry import pose
 from tests.app.small_dataset import BLOCK, NAME, true_pose, write_small_dataset
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture

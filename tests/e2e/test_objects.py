@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.config import PROJECT
-from registration_core.bop import read_dataset
+from registration_core.bop.dataset import read_dataset
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame, wait_for_picture
 from tests.e2e.test_labelling import Desk

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from registration_core import ObjectModel, pose
+from registration_core import ObjectModel
+from registration_core.geometry import pose
 from tests.conftest import REPOSITORY
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import pixel, wait_for_camera, wait_for_picture

@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.config import Settings
-from app.database import Database
+from app.storage.database import Database
 from tests.app.analysis.hand_made import Entry, at, moved, view
 from tests.app.analysis.hand_made_study import HandMadeStudy, ordinary_work, snapped
 from tests.e2e.conftest import take_picture

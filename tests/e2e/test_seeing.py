@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.labeling.cloud_view import COARSE_POINTS
-from registration_core import pose
+from app.views3d.cloud_view import COARSE_POINTS
+from registration_core.geometry import pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import DRAWN_FINELY, take_picture
 from tests.e2e.gizmo import view_frame, wait_for_picture

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page, expect
 from scipy.spatial.transform import Rotation
 
-from app.labeling.placement import point_at_pixel
-from registration_core import Intrinsics, pose
-from registration_core.bop_images import read_depth
+from app.labeling.moves.placement import point_at_pixel
+from registration_core import Intrinsics
+from registration_core.bop.images import read_depth
+from registration_core.geometry import pose
 from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import pixel
 from tests.e2e.test_precision import DEMO, MODEL, PreciseDesk, true_pose

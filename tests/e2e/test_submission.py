@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from registration_core import pose
+from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame
 from tests.e2e.test_labelling import Desk

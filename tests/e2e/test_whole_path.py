@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from registration_core import ObjectModel, pose
-from registration_core.pose_error import adi
+from registration_core import ObjectModel
+from registration_core.geometry import pose
+from registration_core.geometry.pose_error import adi
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, pull, take_hold, view_frame, wait_for_object
 from tests.processes import Server

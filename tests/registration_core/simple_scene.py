@@ -6,8 +6,9 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from registration_core import Intrinsics, ObjectModel, Symmetries, pose
-from registration_core.rasterizer import render_depth
+from registration_core import Intrinsics, ObjectModel, Symmetries
+from registration_core.geometry import pose
+from registration_core.rendering.rasterizer import render_depth
 
 CAMERA = Intrinsics(320, 240, 262.5, 262.5, 159.5, 119.5)
 

@@ -11,7 +11,7 @@ import pytest
 import registration_core
 from registration_core import ALGORITHM, SnapConfig, propose, snap, snap_steps, snap_views
 from registration_core.algorithm import ENTRIES, algorithm_of, imported, sources_hash
-from registration_core.snap_config import AnywhereConfig
+from registration_core.config import AnywhereConfig
 from tests.registration_core.simple_scene import standing_tool
 
 FEW = SnapConfig(anywhere=AnywhereConfig(2_000, 500))
@@ -102,7 +102,7 @@ def test_it_covers_every_module_that_a_result_runs_through():
         for file in ran
         if root in Path(file).parents
     }
-    assert "polish" in names and names <= imported(root, ENTRIES).keys()
+    assert "search.polish" in names and names <= imported(root, ENTRIES).keys()
 
 
 SNAP = """

@@ -11,8 +11,8 @@ import trimesh
 from numba.core.dispatcher import Dispatcher
 from registration_core import SnapConfig, pose, propose, region_of_interest, snap, snap_steps, snap_views
 from registration_core import color_is_aligned, warm_up
-from registration_core.procedural_objects import demo_objects
-from registration_core.rasterizer import render_depth
+from registration_core.synthetic.objects import demo_objects
+from registration_core.rendering.rasterizer import render_depth
 from tests.registration_core.simple_scene import standing_tool
 
 def compiled():

@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 
 from registration_core import fitted
-from registration_core.confidence import FEATURES
-from registration_core.evidence import COUNT
+from registration_core.config import ROUNDS
 from registration_core.fitted import NOTHING, read_fitted
-from registration_core.snap_config import ROUNDS
+from registration_core.judge.confidence import FEATURES
+from registration_core.judge.pixel_evidence import COUNT
 
 TRIES = """
 import registration_core
 from registration_core.fitting.trials import scene_trials
-from registration_core.snap_config import SnapConfig
+from registration_core.config import SnapConfig
 assert "{folder}" in registration_core.__file__
 assert [one.doubt for one in SnapConfig().rounds] == [1.0] * len(SnapConfig().rounds)
 print(sum(len(scene_trials(0, scene)) for scene in range(3)))

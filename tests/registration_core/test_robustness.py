@@ -7,12 +7,13 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from registration_core import Intrinsics, ObjectModel, pose, pose_error, snap
-from registration_core.procedural_objects import demo_objects
-from registration_core.rasterizer import render_depth
-from registration_core.sensor_families import DEMO, draw_sensor
-from registration_core.sensor_model import at_edges, measure
-from registration_core.synthetic_scene import table_model
+from registration_core import Intrinsics, ObjectModel, snap
+from registration_core.geometry import pose, pose_error
+from registration_core.rendering.rasterizer import render_depth
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import table_model
+from registration_core.synthetic.sensor_families import DEMO, draw_sensor
+from registration_core.synthetic.sensors import at_edges, measure
 from tests.registration_core.simple_scene import SimpleScene, nearest, noisy, tool
 
 VGA = Intrinsics(640, 480, 525.0, 525.0, 319.5, 239.5)

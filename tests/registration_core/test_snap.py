@@ -15,16 +15,16 @@ from registration_core import (
     ObjectModel,
     SnapConfig,
     Symmetries,
-    pose,
     region_of_interest,
     snap,
     snap_steps,
     warm_up,
 )
-from registration_core.object_model import ContinuousSymmetry
-from registration_core.rasterizer import render_depth
+from registration_core.config import ParticleFilterConfig
+from registration_core.geometry import pose
+from registration_core.geometry.object_model import ContinuousSymmetry
+from registration_core.rendering.rasterizer import render_depth
 from registration_core.seeding import seed_of
-from registration_core.snap_config import ParticleFilterConfig
 from tests.registration_core.simple_scene import CAMERA, SimpleScene, model_of, nearest, standing_tool
 
 SHORT_FILTER = SnapConfig(

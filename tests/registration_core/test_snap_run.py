@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from registration_core import SnapConfig, pose
-from registration_core.problem import checked_problem
-from registration_core.search import search_of
+from registration_core import SnapConfig
+from registration_core.geometry import pose
+from registration_core.search.snap_input import checked_problem
 from registration_core.snap_run import Sighting, SnapRun
+from registration_core.view_search import search_of
 from tests.registration_core.simple_scene import standing_tool
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from app.labeling.drag import _path_row
-from registration_core import pose
+from app.labeling.moves.drag import _path_row
+from registration_core.geometry import pose
 
 NOON = datetime(2026, 1, 1, 12, tzinfo=UTC)
 START = np.eye(4)

@@ -7,9 +7,8 @@ import numpy as np
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from app.database import Database
-from app.study.plan import StudyPlan, TaskRef
-from app.tables import (
+from app.storage.database import Database
+from app.storage.tables import (
     Event,
     Frame,
     Object,
@@ -22,6 +21,7 @@ from app.tables import (
     Trial,
     User,
 )
+from app.study.plan import StudyPlan, TaskRef
 from registration_core import ALGORITHM
 from tests.app.analysis.hand_made import NOON, Entry, at, moved, view
 

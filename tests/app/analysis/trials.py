@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from app.analysis.pose_errors import PoseErrors
-from app.analysis.trial import Snapped, TrialTrace
+from app.analysis.study_data.trial import Snapped, TrialTrace
+from app.analysis.trace.pose_errors import PoseErrors
 
 NAN = float("nan")
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.auth import Role
-from app.database import Database
-from app.importing import import_dataset
+from app.datasets.importing import import_dataset
 from app.main import create_services
-from app.storage import FileStore
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.roles import Role
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
 from tests.app.postgres import new_database

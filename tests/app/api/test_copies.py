@@ -10,10 +10,10 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
-from app.importing import import_dataset
+from app.datasets.importing import import_dataset
 from app.main import create_services
-from registration_core import pose
+from app.storage.roles import Role
+from registration_core.geometry import pose
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
 from tests.app.rest import log_of, put_pose, sentence, shown, url_of

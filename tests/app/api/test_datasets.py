@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from sqlalchemy import text
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 from tests.app.small_dataset import POSED_SCENE, UNPOSED_SCENE, change_json

@@ -5,7 +5,7 @@ import uuid
 import httpx
 import pytest
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 

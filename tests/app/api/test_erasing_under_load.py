@@ -9,9 +9,9 @@ from typing import Any
 import httpx
 from sqlalchemy import func, select
 
-from app.auth import Role
-from app.tables import EstimateRow, Event, Participant, Registration
-from registration_core import pose
+from app.storage.roles import Role
+from app.storage.tables import EstimateRow, Event, Participant, Registration
+from registration_core.geometry import pose
 from tests.app.api.study_rest import begin_next, invite, new_study, take_part
 from tests.app.api.test_exports import finished_export, submit_all
 from tests.app.live import LiveServer

@@ -11,11 +11,11 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
-from app.export_jobs import INTERRUPTED
+from app.export.processes import INTERRUPTED
 from app.main import create_services
-from app.tables import Export
-from registration_core import pose
+from app.storage.roles import Role
+from app.storage.tables import Export
+from registration_core.geometry import pose
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
 from tests.app.rest import begin, sentence

@@ -9,10 +9,10 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from app.access.throttle import FREE_ATTEMPTS
 from app.api.host_names import host_name, own_names
 from app.config import Settings
 from app.main import create_services
-from app.throttle import FREE_ATTEMPTS
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
 from tests.app.rest import sentence
@@ -68,7 +68,7 @@ def test_a_name_is_told_from_its_port(host: str, expected: str) -> None:
 @pytest.fixture
 def still(monkeypatch: pytest.MonkeyPatch) -> None:
     """No time passes for who has to wait."""
-    monkeypatch.setattr("app.throttle.time", SimpleNamespace(time=lambda: 1000.0))
+    monkeypatch.setattr("app.access.throttle.time", SimpleNamespace(time=lambda: 1000.0))
 
 
 def settings_with(state: Path, cluster: str, **changes: str) -> Settings:

@@ -6,8 +6,8 @@ import httpx
 import numpy as np
 import pytest
 
-from registration_core import pose
-from registration_core.pose_error import adi
+from registration_core.geometry import pose
+from registration_core.geometry.pose_error import adi
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, kinds, log_of, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose
@@ -54,7 +54,7 @@ def test_it_is_off_and_shows_nothing_at_first(script: httpx.Client) -> None:
 def test_a_live_result_is_seen_and_not_logged(
     script: httpx.Client, looked: dict[str, Any], live: LiveServer
 ) -> None:
-    model = live.seat(looked["id"]).model
+    model = live.live_session(looked["id"]).model
     assert adi(np.array(looked["live"]["T_world_object"]), true_pose(TOOL), model.vertices) < 0.003
     assert 0 <= looked["live"]["confidence"] <= 1
     assert np.allclose(looked["T_world_object"], NEAR)
@@ -77,7 +77,7 @@ def test_an_accepted_live_result_is_explained_by_its_estimate(
     row = live.services.log.estimate(event["snap_id"])
     assert row is not None and np.allclose(row.T_world_object_start, NEAR)
 
-    live.services.desk.close_idle(0.0)
+    live.services.live_sessions.close_idle(0.0)
     again = script.get(url).json()
     assert np.allclose(again["T_world_object"], event["T_after"])
     assert again["confidence"] == pytest.approx(accepted["confidence"]) and not again["is_live"]
@@ -110,7 +110,7 @@ def test_in_manual_a_snap_is_refused_in_one_sentence(admin: httpx.Client) -> Non
 
 def test_in_auto_the_end_of_a_drag_is_followed_by_the_machine(live: LiveServer, admin: httpx.Client) -> None:
     registration = begin_under(admin, "auto")
-    session = live.seat(registration["id"]).session
+    session = live.live_session(registration["id"]).session
     session.start_drag()
     session.drag_to(NEAR)
     session.end_drag()

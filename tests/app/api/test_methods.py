@@ -6,8 +6,8 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
-from registration_core import pose
+from app.storage.roles import Role
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import finished_snap, log_of, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose

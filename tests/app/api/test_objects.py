@@ -6,9 +6,9 @@ import httpx
 import numpy as np
 import pytest
 
-from app.importing import import_dataset
+from app.datasets.importing import import_dataset
 from registration_core import ObjectModel
-from registration_core.mesh_file import plain_ply, read_mesh
+from registration_core.geometry.mesh_file import plain_ply, read_mesh
 from tests.app.live import LiveServer
 from tests.app.rest import sentence
 from tests.app.small_dataset import BLOCK, TOOL, change_json

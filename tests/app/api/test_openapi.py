@@ -18,9 +18,9 @@ from schemathesis.specs.openapi.checks import (
     status_code_conformance,
 )
 
-from app.auth import Role
 from app.main import create_app
 from app.services import Services
+from app.storage.roles import Role
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, sentence
 from tests.app.waiting import LONGEST

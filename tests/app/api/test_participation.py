@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.api.study_rest import (
     AGREE,
     QUESTION,
@@ -134,7 +134,7 @@ def test_withdrawing_ends_it_at_once(server, chief, study):
     registration = begin_next(client)
     assert client.post("/api/participation/withdraw").status_code == 204
     sentence(client.get("/api/participation"), 401)
-    assert registration["id"] not in server.services.desk._seats
+    assert registration["id"] not in server.services.live_sessions._sessions
     (row,) = chief.get(f"/api/studies/{study['id']}").json()["participants"]
     assert row["withdrawn_at"]
 
@@ -182,7 +182,7 @@ def test_nothing_of_others_is_known_in_a_trial(server, ann, operator, chief):
     url = f"/api/registrations/{mine['id']}"
     (thing,) = ann.get(f"{url}/things").json()["items"]
     assert thing["is_current"] and thing["state"] == "open" and thing["T_world_object"] is None
-    assert server.seat(mine["id"]).neighbours.known == ()
+    assert server.live_session(mine["id"]).neighbours.known == ()
     assert "'copy'" in sentence(ann.get(f"{url}/copies"), 409)
 
 

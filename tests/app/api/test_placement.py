@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from app.labeling.seat import Seat
-from registration_core import pose
+from app.labeling.live.live_session import LiveSession
+from registration_core.geometry import pose
 from tests.app.export.site import CAMERA, TOOL, mesh_of, model_of
 from tests.app.labeling.viser_client import CAMERA as VISER_CAMERA
 from tests.app.labeling.viser_client import ViserClient
@@ -35,10 +35,10 @@ def last_technique(client: httpx.Client, registration: dict[str, Any]) -> str:
     return event["detail"]["technique"]
 
 
-def open_view(live: LiveServer, seat: Seat) -> ViserClient:
+def open_view(live: LiveServer, live_session: LiveSession) -> ViserClient:
     """A page that looks from (1, 1, 1) at the origin of the world, with z up."""
-    client = ViserClient(live.services.desk.view_socket(seat))
-    view = seat.view
+    client = ViserClient(live.services.live_sessions.view_socket(live_session))
+    view = live_session.view
     assert view is not None
     wait_until(lambda: view.viewpoint is not None, "the page to be known")
     return client
@@ -85,11 +85,13 @@ def test_the_views_axes_are_those_of_the_open_page(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
     T = shown(put_pose(script, registration, true_pose(TOOL)))
-    seat = live.seat(registration["id"])
-    with open_view(live, seat) as client:
+    live_session = live.live_session(registration["id"])
+    with open_view(live, live_session) as client:
         seen_from_the_corner(client)
         away = -np.ones(3) / np.sqrt(3)
-        wait_until(lambda: np.allclose(seat.view.viewpoint.T_world_camera[:3, 2], away), "the camera's place")
+        wait_until(
+            lambda: np.allclose(live_session.view.viewpoint.T_world_camera[:3, 2], away), "the camera's place"
+        )
         moved = shown(post(script, registration, "nudge", axes="view", translation=[0, 0, 0.01]))
     assert moved[:3, 3] - T[:3, 3] == pytest.approx(0.01 * away)
 
@@ -155,11 +157,11 @@ def test_a_click_on_the_object_in_the_image_brings_it_there(
 def test_a_click_on_the_table_in_the_view_lets_it_stand_there(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
-    seat = live.seat(registration["id"])
-    with open_view(live, seat) as client:
+    live_session = live.live_session(registration["id"])
+    with open_view(live, live_session) as client:
         seen_from_the_corner(client)
-        wait_until(lambda: seat.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
-        x, y, z = pose.apply(pose.inverse(seat.view.viewpoint.T_world_camera), [0.12, -0.1, 0.0])
+        wait_until(lambda: live_session.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
+        x, y, z = pose.apply(pose.inverse(live_session.view.viewpoint.T_world_camera), [0.12, -0.1, 0.0])
         half = np.tan(VISER_CAMERA["fov"] / 2)
         across, down = 0.5 + x / z / half * 600 / 800 / 2, 0.5 + y / z / half / 2
         placed = shown(post(script, registration, "place", across=across, down=down))
@@ -190,11 +192,11 @@ def test_the_view_looks_from_elsewhere_and_nothing_is_logged(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any], at: str
 ) -> None:
     T = shown(put_pose(script, registration, true_pose(TOOL)))
-    seat = live.seat(registration["id"])
+    live_session = live.live_session(registration["id"])
     logged = log_of(script, registration["id"])
-    with open_view(live, seat) as client:
+    with open_view(live, live_session) as client:
         seen_from_the_corner(client)
-        wait_until(lambda: seat.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
+        wait_until(lambda: live_session.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
         assert post(script, registration, "look", at=at).status_code == 204
         position = np.array(
             client.wait_for("SetCameraPositionMessage", lambda m: not m["initial"])["position"]
@@ -223,12 +225,12 @@ def test_the_view_stays_during_a_drag_and_without_a_page(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
     assert "Nobody has the 3-D view" in sentence(post(script, registration, "look", at="top"), 409)
-    seat = live.seat(registration["id"])
-    with open_view(live, seat):
-        seat.session.start_drag()
+    live_session = live.live_session(registration["id"])
+    with open_view(live, live_session):
+        live_session.session.start_drag()
         assert "being dragged" in sentence(post(script, registration, "look", at="top"), 409)
         assert "being dragged" in sentence(post(script, registration, "rest"), 409)
-        seat.session.end_drag()
+        live_session.session.end_drag()
 
 
 def test_the_gizmos_axes_are_chosen(
@@ -237,7 +239,7 @@ def test_the_gizmos_axes_are_chosen(
     assert registration["gizmo_axes"] == "object"
     url = f"{url_of(registration)}/gizmo"
     assert script.put(url, json={"axes": "world"}).json()["gizmo_axes"] == "world"
-    session = live.seat(registration["id"]).session
+    session = live.live_session(registration["id"]).session
     T = np.array(registration["T_world_object"])
     session.start_drag()
     assert "being dragged" in sentence(script.put(url, json={"axes": "object"}), 409)

@@ -10,8 +10,8 @@ import pytest
 from sqlalchemy import event, text
 
 from app.api.problems import DISK_FULL
-from app.auth import Role
-from registration_core import pose
+from app.storage.roles import Role
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, sentence
 

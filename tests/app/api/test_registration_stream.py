@@ -11,9 +11,10 @@ import httpx
 import numpy as np
 import pytest
 
+from app.access.auth import Identity
 from app.api import registration_stream
-from app.auth import Actor, Identity, Role
-from registration_core import pose
+from app.storage.roles import Actor, Role
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, put_pose, url_of
 from tests.app.small_dataset import TOOL, true_pose
@@ -63,7 +64,7 @@ def test_a_stream_tells_the_state_at_once_and_after_each_change(
 def test_a_stream_may_skip_but_always_tells_the_last(
     live: LiveServer, script: httpx.Client, registration: dict[str, Any]
 ) -> None:
-    session = live.seat(registration["id"]).session
+    session = live.live_session(registration["id"]).session
     with script.stream("GET", f"{url_of(registration)}/stream") as answer:
         told = messages(answer)
         next(told)
@@ -97,13 +98,13 @@ def test_a_stream_gives_signs_of_life_until_the_login_ends(
 
 def test_a_stream_keeps_its_session_until_it_is_left(live: LiveServer, script: httpx.Client) -> None:
     registration = begin(script, 1)
-    seat = live.seat(registration["id"])
+    live_session = live.live_session(registration["id"])
     with script.stream("GET", f"{url_of(registration)}/stream") as answer:
         told = messages(answer)  # kept: a generator that is thrown away closes the stream
         next(told)
-        assert seat.watchers == 1
-    wait_until(lambda: seat.watchers == 0, "the stream to be left")
-    seat.session.set_pose(true_pose(TOOL), Actor.SCRIPT)
+        assert live_session.watchers == 1
+    wait_until(lambda: live_session.watchers == 0, "the stream to be left")
+    live_session.session.set_pose(true_pose(TOOL), Actor.SCRIPT)
 
 
 def test_a_newer_page_takes_over_and_the_older_says_so(
@@ -160,14 +161,14 @@ def test_who_takes_part_in_a_study_and_others_do_not_see_each_other(
     registration = begin(ordinary)
     name = "P77 beside an operator"
     user = live.services.auth.ensure_user(name, Role.PARTICIPANT)
-    trial = live.services.desk.start(
+    trial = live.services.live_sessions.start(
         registration["task_id"], Identity(user.id, name, Role.PARTICIPANT, Actor.HUMAN)
     )
     url = f"{url_of(registration)}/stream"
-    stand_up = trial.chair.sit("a trial's page", lambda: None)
+    release = trial.page_lease.take("a trial's page", lambda: None)
     with ordinary.stream("GET", url, params={"page": "ordinary"}) as answer:
         told = messages(answer)
         assert next(told)["others"] == []
         assert trial.others() == ()
     assert name not in str(tasks_of(script))
-    stand_up()
+    release()

@@ -9,9 +9,9 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
 from app.labeling.layers import Layers
-from registration_core import pose
+from app.storage.roles import Role
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, log_of, put_pose, sentence, shown, url_of
 from tests.app.small_dataset import TOOL, true_pose
@@ -41,7 +41,7 @@ def test_every_change_has_a_larger_revision(live: LiveServer, script: httpx.Clie
     first = begin(script)
     moved = put_pose(script, first, true_pose(TOOL)).json()
     undone = script.post(f"{url_of(first)}/undo").json()
-    live.services.desk.close_idle(0.0)
+    live.services.live_sessions.close_idle(0.0)
     opened_again = script.get(url_of(first)).json()
     revisions = [state["revision"] for state in (first, moved, undone, opened_again)]
     assert revisions == sorted(set(revisions))
@@ -223,7 +223,7 @@ def test_a_submitted_registration_stays_as_it_is(script: httpx.Client, registrat
 
 def test_during_a_drag_a_script_has_to_wait(live: LiveServer, script: httpx.Client) -> None:
     registration = begin(script)
-    session = live.seat(registration["id"]).session
+    session = live.live_session(registration["id"]).session
     session.start_drag()
     state = script.get(url_of(registration)).json()
     assert state["dragging"] and not state["saved"]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from app.auth import Role
-from registration_core import pose
-from tests.app.labeling.test_proxy import Operator, refused
+from app.storage.roles import Role
+from registration_core.geometry import pose
+from tests.app.api.test_view_proxy import Operator, refused
 from tests.app.rest import begin, sentence
 from tests.app.waiting import wait_until
 

@@ -4,11 +4,12 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
 from app.config import RISK
-from app.tables import CalibrationRow
-from registration_core import ALGORITHM, acceptance, pose
-from registration_core.acceptance import shipped_calibration
+from app.storage.roles import Role
+from app.storage.tables import CalibrationRow
+from registration_core import ALGORITHM, acceptance
+from registration_core.geometry import pose
+from registration_core.judge.acceptance import shipped_calibration
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, put_pose, sentence, url_of
 from tests.app.small_dataset import TOOL, true_pose

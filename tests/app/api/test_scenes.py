@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.importing import import_dataset
-from registration_core.bop import read_color
+from app.datasets.importing import import_dataset
+from registration_core.bop.dataset import read_color
 from tests.app.live import LiveServer
 from tests.app.rest import sentence
 from tests.app.small_dataset import CAMERA, NEAR_VIEW, POSED_SCENE, SIDE_VIEW

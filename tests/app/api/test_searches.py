@@ -4,9 +4,10 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
-from app.scene_data import camera_of
-from registration_core import SnapConfig, pose, propose
+from app.datasets.scene_data import camera_of
+from app.storage.roles import Role
+from registration_core import SnapConfig, propose
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, kinds, log_of, sentence
 from tests.app.small_dataset import TOOL, true_pose
@@ -35,11 +36,11 @@ def test_a_search_is_the_librarys_and_a_candidate_is_taken(
     assert (search["state"], search["seed"], search["region"]) == ("done", 7, None)
     assert operator.get(url).json()["search"] == {"id": search["id"], "state": "done", "message": None}
 
-    seat = server.seat(int(url.rsplit("/", 1)[1]))
-    frame = seat.frames[search["frame_id"]]
+    live_session = server.live_session(int(url.rsplit("/", 1)[1]))
+    frame = live_session.frames[search["frame_id"]]
     depth = server.services.data.depth(frame)
     here = propose(
-        seat.model, depth, camera_of(frame), None, SnapConfig.from_dict({}), np.random.default_rng(7)
+        live_session.model, depth, camera_of(frame), None, SnapConfig.from_dict({}), np.random.default_rng(7)
     )
     assert [one["weight"] for one in search["candidates"]] == [one.weight for one in here]
     T_camera_object = np.array(search["candidates"][0]["T_camera_object"])
@@ -118,7 +119,7 @@ def test_uncertainty_is_told_of_a_snapped_pose_alone_and_after_a_restart(
     assert 0 < told["translation"] < 0.05 and 0 < told["rotation"] <= np.pi
     assert len(told["unknown"]) == len(estimate["ambiguities"])
     assert "has the 3-D view" in sentence(operator.put(f"{url}/uncertainty", json={"shown": False}), 409)
-    server.services.desk.close_idle(0.0)
+    server.services.live_sessions.close_idle(0.0)
     assert operator.get(f"{url}/uncertainty").json() == told
     operator.post(f"{url}/undo")
     assert operator.get(f"{url}/uncertainty").json() == nothing

@@ -5,9 +5,10 @@ from http.cookies import SimpleCookie
 import httpx
 import pytest
 
+from app.access.auth import LOGIN_LIFETIME
+from app.access.throttle import FREE_ATTEMPTS
 from app.api.dependencies import SESSION_COOKIE
-from app.auth import LOGIN_LIFETIME, Role
-from app.throttle import FREE_ATTEMPTS
+from app.storage.roles import Role
 from tests.app.live import LiveServer
 from tests.app.rest import begin, kinds, sentence
 

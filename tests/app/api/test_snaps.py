@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from app.api.snaps import INTERRUPTED
+from app.datasets.scene_data import camera_of
 from app.main import create_services
-from app.scene_data import camera_of
-from app.tables import Object
-from registration_core import ALGORITHM, SnapConfig, pose, snap
-from registration_core.pose_error import adi
+from app.storage.tables import Object
+from registration_core import ALGORITHM, SnapConfig, snap
+from registration_core.geometry import pose
+from registration_core.geometry.pose_error import adi
 from tests.app.api.test_problems import full_disk
 from tests.app.conftest import settings_for
 from tests.app.live import LiveServer, running_server
@@ -58,7 +59,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
     assert (done["state"], done["progress"], done["message"]) == ("done", 1.0, None)
     assert done["standing"] is None
     estimate = done["estimate"]
-    frame = live.seat(near["id"]).frames[near["frame_id"]]
+    frame = live.live_session(near["id"]).frames[near["frame_id"]]
     with live.services.database.read() as session:
         tool = session.get_one(Object, script.get(f"/api/tasks/{near['task_id']}").json()["object"]["id"])
     expected = snap(
@@ -84,7 +85,7 @@ def test_a_snap_by_rest_is_the_librarys_snap(
 def test_a_snap_uses_the_frames_that_see_the_object_and_is_checked_by_others(
     live: LiveServer, script: httpx.Client, near: dict[str, Any]
 ) -> None:
-    frames = live.seat(near["id"]).frames
+    frames = live.live_session(near["id"]).frames
     shown, other = near["frame_id"], next(id for id in frames if id != near["frame_id"])
     both = finished_snap(script, request_snap(script, near, seed=7))["estimate"]
     assert (both["used_frames"], both["other_frames"], both["frame_id"]) == ([shown, other], [], shown)
@@ -100,7 +101,11 @@ def test_a_snap_uses_the_frames_that_see_the_object_and_is_checked_by_others(
         T_world_camera = np.array(frames[shown].T_world_camera)
         assert np.allclose(T_world_camera @ estimate["T_camera_object"], estimate["T_world_object"])
         assert (
-            adi(np.array(estimate["T_world_object"]), true_pose(TOOL), live.seat(near["id"]).model.vertices)
+            adi(
+                np.array(estimate["T_world_object"]),
+                true_pose(TOOL),
+                live.live_session(near["id"]).model.vertices,
+            )
             < 0.003
         )
     (*_, requested, applied) = log_of(script, near["id"])
@@ -127,7 +132,7 @@ def test_a_finished_snap_moves_the_object(
     assert state["T_world_object"] == done["estimate"]["T_world_object"]
     assert state["confidence"] == done["estimate"]["confidence"]
     assert (state["snap"]["id"], state["snap"]["state"]) == (snap_id, "done")
-    vertices = live.seat(near["id"]).model.vertices
+    vertices = live.live_session(near["id"]).model.vertices
     assert adi(np.array(state["T_world_object"]), true_pose(TOOL), vertices) < 0.003
     requested, applied = log_of(script, near["id"])[-2:]
     assert (requested["kind"], requested["actor"]) == ("snap_requested", "script")
@@ -164,7 +169,7 @@ def test_a_snap_searches_as_far_as_it_is_told_and_can_be_repeated(
 def test_where_nothing_is_told_the_last_drags_tell(
     live: LiveServer, script: httpx.Client, near: dict[str, Any]
 ) -> None:
-    session = live.seat(near["id"]).session
+    session = live.live_session(near["id"]).session
     session.start_drag()
     session.drag_to(NEAR @ pose.exp([0.05, 0, 0, 0, 0, 0]))
     session.end_drag()

@@ -8,7 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
-from registration_core import pose
+from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, put_pose, sentence
 from tests.app.small_dataset import BLOCK, TOOL, true_pose

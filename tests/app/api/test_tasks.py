@@ -8,10 +8,10 @@ import pytest
 from PIL import Image
 from sqlalchemy import select
 
-from app.analysis.runs import TASK_PARTS, place_name
-from app.auth import Role
-from app.importing import import_dataset
-from app.tables import Task
+from app.analysis.study_data.runs import TASK_PARTS, place_name
+from app.datasets.importing import import_dataset
+from app.storage.roles import Role
+from app.storage.tables import Task
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 

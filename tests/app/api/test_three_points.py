@@ -6,9 +6,9 @@ import httpx
 import numpy as np
 import pytest
 
-from app.auth import Role
-from app.labeling.placement import measured_points, point_at_pixel
-from registration_core import pose
+from app.labeling.moves.placement import measured_points, point_at_pixel
+from app.storage.roles import Role
+from registration_core.geometry import pose
 from tests.app.api.test_placement import open_view, pixel_of
 from tests.app.export.site import CAMERA, TOOL, mesh_of, model_of, observed_depth
 from tests.app.live import LiveServer
@@ -144,7 +144,7 @@ def test_a_point_is_told_and_marks_are_drawn_where_the_view_is_open(
     assert np.linalg.norm(np.array(point) - centre) < MODEL.radius
     marks = {"points_world": [point, [0, 0, 0]]}
     assert "Nobody has the 3-D view" in sentence(script.put(f"{url}/marks", json=marks), 409)
-    with open_view(live, live.seat(registration["id"])) as client:
+    with open_view(live, live.live_session(registration["id"])) as client:
         assert script.put(f"{url}/marks", json=marks).status_code == 204
         label = client.node("LabelMessage", "/marks/1/number")
         assert label["props"]["text"] == "1"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from .site import ExportedSite, Site, make_site
+from tests.app.export.site import ExportedSite, Site, make_site
 
 
 @pytest.fixture

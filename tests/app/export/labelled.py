@@ -4,13 +4,12 @@ from pathlib import Path
 
 from sqlalchemy import select
 
-from app.database import Database
+from app.datasets.importing import import_dataset
 from app.export.job import export_dataset
-from app.importing import import_dataset
-from app.storage import FileStore
-from app.tables import Registration, Task, User
-
-from .site import START, ignore_progress
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.tables import Registration, Task, User
+from tests.app.export.site import START, ignore_progress
 
 
 def labelled_export(source: Path, folder: Path) -> Path:

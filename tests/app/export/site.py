@@ -9,17 +9,18 @@ import trimesh
 from PIL import Image
 from sqlalchemy.orm import Session
 
-from app.database import Database
-from app.export.gate import Expected, expected_images
+from app.datasets.symmetries import first_version
+from app.export.content.selection import select_dataset
+from app.export.gate.checks import Expected, expected_images
 from app.export.job import export_dataset
-from app.export.selection import select_dataset
-from app.storage import FileStore
-from app.symmetries import first_version
-from app.tables import Dataset, Frame, Object, Registration, Scene, Task, User
-from registration_core import Intrinsics, ObjectModel, Symmetries, pose
-from registration_core.bop_writer import write_color_png, write_depth_png, write_mesh
-from registration_core.object_model import discrete
-from registration_core.rasterizer import render_depth
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.tables import Dataset, Frame, Object, Registration, Scene, Task, User
+from registration_core import Intrinsics, ObjectModel, Symmetries
+from registration_core.bop.writer import write_color_png, write_depth_png, write_mesh
+from registration_core.geometry import pose
+from registration_core.geometry.object_model import discrete
+from registration_core.rendering.rasterizer import render_depth
 
 CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
 DEPTH_SCALE = 0.1

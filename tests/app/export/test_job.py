@@ -16,14 +16,13 @@ from PIL import Image
 from sqlalchemy import select
 
 from app.export import job
-from app.export.gate_instance import GateError
+from app.export.content.selection import ExportError
+from app.export.gate.instance import GateError
 from app.export.job import ExportSummary, export_dataset, run_job
-from app.export.selection import ExportError
-from app.tables import Export, Scene, User
-from registration_core import pose
-from registration_core.bop import read_dataset
-
-from .site import NEAR_VIEW, POSED, TOOL, Site, ignore_progress, true_pose
+from app.storage.tables import Export, Scene, User
+from registration_core.bop.dataset import read_dataset
+from registration_core.geometry import pose
+from tests.app.export.site import NEAR_VIEW, POSED, TOOL, Site, ignore_progress, true_pose
 
 
 def export(site: Site, target: Path) -> ExportSummary:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from registration_core import pose
-from registration_core.bop import read_dataset
-
-from .labelled import labelled_export
+from registration_core.bop.dataset import read_dataset
+from registration_core.geometry import pose
+from tests.app.export.labelled import labelled_export
 
 
 @pytest.mark.parametrize(("name", "tolerance"), [("ycbv", 1e-9), ("bunny", 0.02)])

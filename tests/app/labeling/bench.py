@@ -5,23 +5,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from app.event_log import NewEvent
-from app.labeling.assessment import Assessed, Assessment
-from app.labeling.history import replay
-from app.labeling.search import SearchOrder, SearchResult
+from app.confidence.assessment import Assessed, Assessment
+from app.labeling.moves.history import replay
+from app.labeling.permissions import Wanted
+from app.labeling.scene.known_object import KnownObject
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
-from app.labeling.snap_exchange import (
-    KnownObject,
-    RequestSnap,
-    SnapFailure,
-    SnapFrames,
-    SnapOrder,
-    SnapResult,
-    Wanted,
-)
-from app.tables import Condition, EstimateRow, Method
-from registration_core import Ambiguity, Certificates, Check, Estimate, Hypothesis, pose
+from app.labeling.snaps.find import SearchOrder, SearchResult
+from app.labeling.snaps.snap_exchange import RequestSnap, SnapFailure, SnapFrames, SnapOrder, SnapResult
+from app.storage.event_log import NewEvent
+from app.storage.tables import Condition, EstimateRow, Method
+from registration_core import Ambiguity, Certificates, Check, Estimate, Hypothesis
+from registration_core.geometry import pose
 
 START = pose.exp([0.1, 0.2, 0.8, 0.3, -0.2, 0.1])
 FRAMES = (11, 12)

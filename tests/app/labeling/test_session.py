@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.auth import Actor
 from app.labeling.layers import Layers
+from app.labeling.moves.pose_record import ActionError
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
-from app.labeling.track import ActionError
+from app.storage.roles import Actor
 from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted
 
 

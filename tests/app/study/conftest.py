@@ -5,14 +5,15 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from app.auth import Auth, Role
-from app.database import Database
-from app.importing import import_dataset
-from app.scene_data import SceneData
-from app.storage import FileStore
+from app.access.auth import Auth
+from app.datasets.importing import import_dataset
+from app.datasets.scene_data import SceneData
+from app.storage.database import Database
+from app.storage.files import FileStore
+from app.storage.roles import Role
+from app.storage.tables import Task, User
 from app.study.plan import StudyPlan, TaskRef
 from app.study.studies import Studies
-from app.tables import Task, User
 
 
 @pytest.fixture

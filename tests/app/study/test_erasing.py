@@ -4,10 +4,10 @@ import pytest
 from sqlalchemy import delete, func, select, text, update
 from sqlalchemy.exc import DBAPIError
 
-from app.auth import Actor
-from app.event_log import EventLog, NewEvent
+from app.storage.event_log import EventLog, NewEvent
+from app.storage.roles import Actor
+from app.storage.tables import EstimateRow, Event, Frame, Registration, Task, User
 from app.study.erasing import erase_registrations
-from app.tables import EstimateRow, Event, Frame, Registration, Task, User
 
 
 def work_of(database, name):

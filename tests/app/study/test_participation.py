@@ -2,9 +2,9 @@
 
 import pytest
 
+from app.storage.tables import Registration, Task
 from app.study.participation import place_of, require_turn, sees
 from app.study.plan import StudyError
-from app.tables import Registration, Task
 from tests.app.study.test_studies import submit, tasks_of
 
 

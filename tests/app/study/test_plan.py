@@ -84,20 +84,20 @@ def test_the_minutes_are_those_of_all_tasks_with_practice():
 
 
 def test_an_optional_question_offers_to_tell_nothing_and_may_be_left_empty():
-    asked = Question(text="Hand?", choices=["left", "right"], optional=True)
+    asked = Question(text="MotorModel?", choices=["left", "right"], optional=True)
     assert asked.offered == ["left", "right", DECLINED]
     assert (asked.checked(" left "), asked.checked(DECLINED), asked.checked(" ")) == ("left", DECLINED, None)
     with pytest.raises(StudyError, match="choose one of left, right, Rather not say"):
         asked.checked("both")
     assert Question(text="Years?", optional=True).offered == []
-    own = Question(text="Hand?", choices=["left", DECLINED], optional=True)
+    own = Question(text="MotorModel?", choices=["left", DECLINED], optional=True)
     assert own.offered == ["left", DECLINED]
 
 
 def test_a_question_of_before_has_to_be_answered_with_its_own_choices():
-    old = Question.model_validate({"text": "Hand?", "choices": ["left", "right"]})
+    old = Question.model_validate({"text": "MotorModel?", "choices": ["left", "right"]})
     assert not old.optional and old.offered == ["left", "right"]
-    for answer, sentence in (("", "please answer 'Hand\\?'"), (DECLINED, "choose one of left, right")):
+    for answer, sentence in (("", "please answer 'MotorModel\\?'"), (DECLINED, "choose one of left, right")):
         with pytest.raises(StudyError, match=sentence):
             old.checked(answer)
 
@@ -113,7 +113,7 @@ def test_a_question_of_before_has_to_be_answered_with_its_own_choices():
         ({"groups": {}}, "at least 1 item"),
         ({"groups": {"novice": 1, "novice ": 3}}, "novice is there twice"),
         ({"groups": {"no\0vice": 1}}, "control character"),
-        ({"questions": [{"text": "Hand?", "choices": ["left"]}]}, "left is the only choice"),
+        ({"questions": [{"text": "MotorModel?", "choices": ["left"]}]}, "left is the only choice"),
         ({"questions": [{"text": "Left\nor right?"}]}, "write one line"),
         ({"questions": [{"text": "Age?"}, {"text": "Age?"}]}, "Age\\? is there twice"),
         ({"tasks": [{"scene_id": s, "object_id": 1} for s in range(1, 400)]}, "would do 1598 tasks"),

@@ -3,10 +3,11 @@
 import pytest
 from sqlalchemy import func, select
 
-from app.auth import Actor, Auth, SignInError
-from app.event_log import EventLog, NewEvent
+from app.access.auth import Auth, SignInError
+from app.storage.event_log import EventLog, NewEvent
+from app.storage.roles import Actor
+from app.storage.tables import Registration, Scene, Task, Trial
 from app.study.plan import DECLINED, StudyError, StudyPlan, order_of
-from app.tables import Registration, Scene, Task, Trial
 
 
 @pytest.fixture
@@ -145,14 +146,14 @@ def test_answers_are_those_that_are_asked_for(studies, study):
 
 def test_what_is_left_empty_is_kept_apart_from_what_is_not_told(studies, plan, admin):
     hand, years = (
-        {"text": "Hand?", "choices": ["left", "right"], "optional": True},
+        {"text": "MotorModel?", "choices": ["left", "right"], "optional": True},
         {"text": "Years?", "optional": True},
     )
     asking = StudyPlan.model_validate(plan.model_dump() | {"questions": [hand, years]})
     study = studies.create("asking", asking, 7, admin.id)
     for group, answers, kept in (
-        ("novice", {"Hand?": DECLINED, "Years?": " "}, {"Hand?": DECLINED, "Years?": None}),
-        ("expert", {}, {"Hand?": None, "Years?": None}),
+        ("novice", {"MotorModel?": DECLINED, "Years?": " "}, {"MotorModel?": DECLINED, "Years?": None}),
+        ("expert", {}, {"MotorModel?": None, "Years?": None}),
     ):
         participant = studies.add_participant(study.id, group).participant
         studies.answer(participant.id, answers)

@@ -8,8 +8,8 @@ from rich.console import Console
 
 from benchmarks.registration.agreement import SPREADS, WEIGHINGS, compared, print_agreement, rankings
 from benchmarks.registration.instances import HALF, Instance
-from registration_core.procedural_objects import demo_objects
-from registration_core.synthetic_scene import make_scene
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import make_scene
 
 SCORES = np.random.default_rng(4).normal(size=300)
 

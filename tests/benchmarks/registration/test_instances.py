@@ -20,7 +20,7 @@ from benchmarks.registration.instances import (
     sensor_instances,
     synthetic_instances,
 )
-from registration_core.rasterizer import render_depth
+from registration_core.rendering.rasterizer import render_depth
 
 
 def shares(instance: Instance) -> tuple[float, float]:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from benchmarks.registration.judging import Judge
-from registration_core import ObjectModel, pose
-from registration_core.procedural_objects import demo_objects
+from registration_core import ObjectModel
+from registration_core.geometry import pose
+from registration_core.synthetic.objects import demo_objects
 
 OBJECTS = {known.name: known.model for known in demo_objects()}
 TRUTH = pose.exp([0.02, 0.05, 0.7, 0.4, -1.0, 0.2])

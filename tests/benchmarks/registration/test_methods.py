@@ -17,10 +17,10 @@ from benchmarks.registration.methods import (
 from benchmarks.registration.several_views import turned_mug
 from benchmarks.registration.starts import SHELLS, starts
 from benchmarks.registration.trials import Trial, try_instance
-from registration_core import pose
-from registration_core.procedural_objects import demo_objects
-from registration_core.rasterizer import render_depth
-from registration_core.synthetic_scene import CAMERA, make_scene
+from registration_core.geometry import pose
+from registration_core.rendering.rasterizer import render_depth
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import CAMERA, make_scene
 
 SHELL, METHODS = SHELLS[0], available_methods()
 DRILL, MUG = (known.model for known in demo_objects()[:2])

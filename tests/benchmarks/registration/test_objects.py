@@ -8,7 +8,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from benchmarks.registration.objects import YCB_SYMMETRIES, known_objects, ycb_object
-from registration_core import ObjectModel, pose
+from registration_core import ObjectModel
+from registration_core.geometry import pose
 
 
 def farthest_mean(model: ObjectModel) -> float:

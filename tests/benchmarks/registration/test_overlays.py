@@ -26,9 +26,9 @@ from benchmarks.registration.overlays import (
 )
 from benchmarks.registration.starts import GOOD, NEAR
 from benchmarks.registration.trials import Trial
-from registration_core import pose
-from registration_core.procedural_objects import demo_objects
-from registration_core.synthetic_scene import make_scene
+from registration_core.geometry import pose
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import make_scene
 
 DRILL = demo_objects()[0].model
 

@@ -7,9 +7,9 @@ from benchmarks.registration import prototype
 from benchmarks.registration.instances import HALF, Instance
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.starts import MIDDLE, starts
-from registration_core import pose
-from registration_core.procedural_objects import demo_objects
-from registration_core.synthetic_scene import make_scene
+from registration_core.geometry import pose
+from registration_core.synthetic.objects import demo_objects
+from registration_core.synthetic.scene import make_scene
 
 if not prototype.is_there():
     pytest.skip(f"needs the prototype in {prototype.FOLDER}", allow_module_level=True)

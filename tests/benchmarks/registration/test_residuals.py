@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.registration.residuals import RIM, correlation_length, residuals
-from registration_core.sensor_model import field
+from registration_core.synthetic.sensors import field
 
 SHAPE = (240, 320)
 SQUARE = (slice(40, 200), slice(80, 240))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.registration.starts import GOOD, SHELLS, Shell, starts
-from registration_core import Intrinsics, ObjectModel, pose
+from registration_core import Intrinsics, ObjectModel
+from registration_core.geometry import pose
 
 CAMERA = Intrinsics(640, 480, 570.0, 570.0, 319.5, 239.5)
 # its origin lies outside of it, as a scan's may

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from registration_core.confidence import FEATURES
 from registration_core.fitting.calibration import (
     FREE,
     auroc,
@@ -13,6 +12,7 @@ from registration_core.fitting.calibration import (
     log_loss,
     logistic_weights,
 )
+from registration_core.judge.confidence import FEATURES
 
 
 def test_logistic_weights_are_found_and_negative_only_where_they_may_be() -> None:

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from registration_core.color_edges import color_changes, color_is_aligned
 from registration_core.fitting.colors import colored
 from registration_core.fitting.objects import random_object
 from registration_core.fitting.scenes import FIRST, SETTINGS, picture
+from registration_core.search.color_edges import color_changes, color_is_aligned
 
 MODELS = [random_object(kind, 0).model for kind in ("mug", "carton", "gear", "bowl", "figure")]
 

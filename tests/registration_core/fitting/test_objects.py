@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from registration_core import pose
 from registration_core.fitting.objects import CELL, KINDS, built_of_cells, random_object
-from registration_core.viewpoint_model import build_viewpoint_model
+from registration_core.geometry import pose
+from registration_core.search.viewpoint_model import build_viewpoint_model
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))

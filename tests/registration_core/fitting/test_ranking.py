@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from registration_core import evidence
 from registration_core.fitting.ranking import (
     RIDGES,
     Choice,
@@ -12,6 +11,7 @@ from registration_core.fitting.ranking import (
     needless,
     signs,
 )
+from registration_core.judge import pixel_evidence as evidence
 
 F = evidence.COUNT + 2
 

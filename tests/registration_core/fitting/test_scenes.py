@@ -5,7 +5,7 @@ import pytest
 
 from registration_core.fitting.objects import random_object
 from registration_core.fitting.scenes import SETTINGS, picture
-from registration_core.rasterizer import render_depth
+from registration_core.rendering.rasterizer import render_depth
 
 MODELS = [random_object(kind, 0).model for kind in ("mug", "carton", "gear", "bowl", "figure")]
 

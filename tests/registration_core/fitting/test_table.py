@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from registration_core import evidence
 from registration_core.fitted import PATH
 from registration_core.fitting.__main__ import check, differences, written
 from registration_core.fitting.numbers import last_rounds
 from registration_core.fitting.table import FeatureTable, from_units, in_units, read_table
+from registration_core.judge import pixel_evidence as evidence
 
 
 @pytest.fixture(scope="module")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from registration_core import pose
+from registration_core.config import SnapConfig
 from registration_core.fitting.replay import winner
 from registration_core.fitting.trials import SHELLS, Trial, distances, scene_trials, start_on, true_model
-from registration_core.snap_config import SnapConfig
+from registration_core.geometry import pose
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import httpx
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.waiting import LONGEST
 from tests.processes import serving
 from tests.tools.attack.malformed import attack_bodies, attack_headers, attack_paths

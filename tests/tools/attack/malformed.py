@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from app.api.body_limits import LARGEST_BODY
-from app.auth import Role
+from app.storage.roles import Role
 from tests.tools.attack.target import Outcome, Target, refused, status_of, unbroken
 
 UPWARDS = ("../", "..%2f", "%2e%2e/", "%2e%2e%2f", "..%5c", "..\\", "....//", "%252e%252e%252f", "..%c0%af")

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import httpx
 
+from app.access.throttle import FREE_ATTEMPTS
 from app.api.body_limits import SECONDS_FOR_A_BODY
-from app.connections import SECONDS_FOR_HEADERS
-from app.throttle import FREE_ATTEMPTS
+from app.serving.connections import SECONDS_FOR_HEADERS
 from tests.tools.attack.target import Outcome, Target
 
 AT_ONCE = 40

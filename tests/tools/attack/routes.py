@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import httpx
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.tools.attack.target import Outcome, Target
 
 OPEN = frozenset(

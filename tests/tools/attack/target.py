@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx
 
-from app.auth import Role
+from app.storage.roles import Role
 from tests.app.api.study_rest import invite, new_study
 from tests.app.waiting import LONGEST
 

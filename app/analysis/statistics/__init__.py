@@ -1,0 +1,1 @@
+"""What is computed from trials: curves, fits, intervals and comparisons."""

@@ -1,0 +1,1 @@
+"""Logs as poses over time."""

@@ -1,0 +1,1 @@
+"""Datasets: imported, and read as arrays, meshes and pictures."""

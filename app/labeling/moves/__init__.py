@@ -1,0 +1,1 @@
+"""Where an object is moved, and how that is recorded and undone."""

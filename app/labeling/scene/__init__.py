@@ -1,0 +1,1 @@
+"""The other objects of a scene, and what its depth says."""

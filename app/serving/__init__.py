@@ -1,0 +1,1 @@
+"""The port, the state folder and the memory of a running server."""

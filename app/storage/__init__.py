@@ -1,0 +1,1 @@
+"""The database, its append-only log, and the files."""

@@ -1,0 +1,1 @@
+"""Snaps from every pose that operators passed through, computed afterwards."""

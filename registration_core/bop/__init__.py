@@ -1,0 +1,1 @@
+"""BOP datasets, read, checked and written: the only place with millimetres."""

@@ -1,0 +1,1 @@
+"""Poses, cameras, meshes and error measures."""

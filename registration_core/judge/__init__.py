@@ -1,0 +1,1 @@
+"""Decides between candidates, and how sure that is."""

@@ -1,0 +1,1 @@
+"""Depth and colour images of objects, and comparisons with measured depth."""

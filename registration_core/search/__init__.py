@@ -1,0 +1,1 @@
+"""Looks for poses that explain what a view shows."""

@@ -1,0 +1,1 @@
+"""Symmetries of meshes: found, and made into a model's."""

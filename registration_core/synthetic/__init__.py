@@ -1,0 +1,1 @@
+"""Scenes made in code, and what depth sensors make of them."""
