@@ -31,11 +31,13 @@ await openPage(message, async ({ role }) => {
 });
 
 async function showPage() {
-  datasets = await getAll("/api/datasets");
+  const [formats, found] = await Promise.all([get("/api/exports/formats"), getAll("/api/datasets")]);
+  datasets = found;
   if (datasets.length === 0) {
     message.show("There is nothing to export yet. Import a dataset first, on the home page.");
     return;
   }
+  byId("format").replaceChildren(...formats.map(({ name, title }) => new Option(title, name)));
   byId("dataset").replaceChildren(...datasets.map(({ name, id }) => new Option(name, id)));
   const asked = new URLSearchParams(location.search).get("dataset_id");
   if (datasets.some(({ id }) => String(id) === asked)) byId("dataset").value = asked;

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException
 from fastapi.responses import FileResponse
-from pydantic import BaseModel, Field
+from pydantic import AfterValidator, BaseModel, Field
 from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
@@ -22,19 +22,36 @@ from app.api.dependencies import (
 )
 from app.api.problems import InputError
 from app.export.content.selection import Choice
+from app.export.formats.registry import formats
 from app.services import Services
-from app.storage.tables import Dataset, Export, Format, Scene
+from app.storage.tables import Dataset, Export, Scene
 
 router = APIRouter(prefix="/api/exports", tags=["exports"])
 
 RowId = Annotated[int, Field(ge=1, le=2**31 - 1)]
 
 
+def _known_format(name: str) -> str:
+    if name not in formats():
+        raise ValueError(f"there is no format {name!r}; choose one of {', '.join(formats())}")
+    return name
+
+
+FormatName = Annotated[str, AfterValidator(_known_format), Field(json_schema_extra={"enum": list(formats())})]
+
+
+class FormatOut(BaseModel):
+    """What an export can be given as."""
+
+    name: str
+    title: str
+
+
 class NewExport(BaseModel):
     """What is to be exported, and how."""
 
     dataset_id: int = Field(ge=1, le=2**31 - 1)
-    format: Format = Field("bop", description='A whole dataset, or "csv": its poses alone.')
+    format: FormatName = Field("bop", description='A whole dataset, or "csv": its poses alone.')
     scene_ids: list[RowId] | None = Field(
         None, min_length=1, max_length=10_000, description="Scenes to export; all where left out."
     )
@@ -92,6 +109,12 @@ def start_export(body: NewExport, services: ServicesDep, identity: AdminDep) -> 
         raise InputError(f"scene_ids: scene {strange[0]} is not of dataset {body.dataset_id}.")
     choice = Choice(None if body.scene_ids is None else frozenset(body.scene_ids), frozenset(body.without))
     return ExportId(id=services.export_jobs.start(body.dataset_id, body.format, identity.user_id, choice).id)
+
+
+@router.get("/formats")
+def list_formats(_identity: AdminDep) -> list[FormatOut]:
+    """What an export can be given as."""
+    return [FormatOut(name=one.name, title=one.title) for one in formats().values()]
 
 
 @router.get("")

@@ -2,12 +2,13 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli.study import study_cli
 from app.cli.terminal import checked_database, console, fail, open_database, progress, read_settings
+from app.export.formats.registry import formats
 
 if TYPE_CHECKING:
     from app.config import Settings
@@ -163,12 +164,24 @@ def import_command(
     )
 
 
+def _known_format(name: str) -> str:
+    if name not in formats():
+        raise typer.BadParameter(f"{name!r} is not one of {', '.join(formats())}")
+    return name
+
+
 @cli.command("export")
 def export_command(
     dataset: Annotated[str, typer.Argument(help="Name of the dataset.")],
     out: Annotated[Path, typer.Argument(help="Zip file to write.")],
-    export_format: Annotated[
-        Literal["bop", "csv"], typer.Option("--format", help="A whole BOP dataset, or its poses alone.")
+    format_name: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="A whole BOP dataset, or its poses alone.",
+            metavar=f"[{'|'.join(formats())}]",
+            callback=_known_format,
+        ),
     ] = "bop",
 ) -> None:
     """Export the submitted poses of a dataset, checked by reading them back."""
@@ -185,7 +198,7 @@ def export_command(
             dataset_id,
             out,
             on_progress,
-            export_format,
+            format_name,
         )
     console.print(
         f"{out}: {summary.annotations} poses in {summary.images} images of {summary.scenes} scenes, read back"

@@ -11,10 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from app.datasets.importing import DatasetImportError, ImportSummary, import_dataset
+from app.datasets.importing import DatasetImportError, ImportSummary, import_bop, in_bop_form
 from app.storage.database import Database
 from app.storage.files import FileStore
-from registration_core.bop.layout import find_root
 
 UNREADABLE = (
     zipfile.BadZipFile, NotImplementedError, EOFError, RuntimeError, zlib.error, lzma.LZMAError
@@ -32,16 +31,15 @@ def import_archive(
     max_bytes: int,
     depth_scale: float | None = None,
 ) -> ImportSummary:
-    """Import a zip file that holds one BOP dataset, at its top or in a folder, as `import_dataset` does.
+    """Import a zip file that holds one dataset, at its top or in a folder, as `import_dataset` does.
 
     Raises:
         ValueError: in one sentence, as `import_dataset` does, and where the archive is no sound zip file, is
             too large when unpacked, or has an entry that would climb out of its folder.
     """
-    with _unpacked(archive, max_bytes) as folder:
-        root = find_root(folder)
+    with _unpacked(archive, max_bytes) as folder, in_bop_form(folder, files) as root:
         name = name if root == folder else root.name
-        return import_dataset(database, files, root, name, depth_scale=depth_scale)
+        return import_bop(database, files, root, name, depth_scale=depth_scale)
 
 
 @contextmanager

@@ -1,8 +1,9 @@
-"""Takes BOP datasets in: checked whole before anything is written, and repeatable without duplicates."""
+"""Takes datasets in: checked whole before anything is written, and repeatable without duplicates."""
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from app.datasets.formats.registry import as_bop
 from app.datasets.import_plan import PlannedTask, World, or_identity, worlds_of
 from app.datasets.import_warnings import DatasetWarning, dataset_warnings, median_depth, suggested_depth_scale
 from app.datasets.scene_data import symmetries_to_json
@@ -18,11 +20,11 @@ from app.datasets.symmetries import first_version, keep_suggestions, open_sugges
 from app.storage.database import Database
 from app.storage.files import FileStore
 from app.storage.tables import Dataset, Frame, Object, Scene, Task
+from app.storage.unfinished import unfinished
 from registration_core import Symmetries
 from registration_core.bop.dataset import BopDataset, BopImage, BopObject, read_dataset, with_depth_scale
 from registration_core.bop.fields import LONGEST_NAME, is_name
 from registration_core.bop.images import plain_color, plain_depth
-from registration_core.bop.layout import find_root
 from registration_core.search.viewpoint_model import check_visible
 
 Row = TypeVar("Row", Object, Scene, Frame, Task)
@@ -70,7 +72,7 @@ def import_dataset(
     progress: Progress | None = None,
     depth_scale: float | None = None,
 ) -> ImportSummary:
-    """Import the BOP dataset in a folder under its own or another name.
+    """Import the dataset in a folder under its own or another name.
 
     What is there already is left as it is; what is new is added.
 
@@ -86,8 +88,31 @@ def import_dataset(
         ValueError: in one sentence, where the folder is not sound, or where it contradicts what was imported
             before under this name.
     """
-    folder = find_root(folder)
-    name = name or folder.resolve().name
+    with in_bop_form(folder, files) as root:
+        return import_bop(database, files, root, name or root.resolve().name, progress, depth_scale)
+
+
+@contextmanager
+def in_bop_form(folder: Path, files: FileStore) -> Iterator[Path]:
+    """The root of the dataset in a folder, in the form of BOP until the block ends.
+
+    Raises:
+        ValueError: in one sentence, where no dataset is found.
+    """
+    files.root.mkdir(parents=True, exist_ok=True)
+    with unfinished(files.root) as work:
+        yield as_bop(folder, work)
+
+
+def import_bop(
+    database: Database,
+    files: FileStore,
+    folder: Path,
+    name: str,
+    progress: Progress | None = None,
+    depth_scale: float | None = None,
+) -> ImportSummary:
+    """Import the BOP dataset that a folder is, as `import_dataset` does."""
     check_name(name)
     source = _in_plausible_units(read_dataset(folder, progress), depth_scale)
     models = {item.obj_id: item.model for item in source.objects}

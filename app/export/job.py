@@ -15,17 +15,17 @@ from sqlalchemy import select
 from sqlalchemy.orm import joinedload
 
 from app.export.archive import pack
+from app.export.bop.dataset import ModelCache, write_dataset
+from app.export.bop.interaction_log import write_interaction_log
 from app.export.content.selection import EVERYTHING, Choice, ExportError, Selection, select_dataset
-from app.export.formats.bop import ModelCache, write_dataset
-from app.export.formats.interaction_log import write_interaction_log
-from app.export.formats.results_csv import write_results
+from app.export.formats.registry import formats
 from app.export.gate.checks import Failure, ObjectsError, check_export, expected_images
 from app.export.gate.failure_picture import failure_picture
 from app.export.gate.instance import GateError
 from app.storage.database import Database
 from app.storage.faults import advice
 from app.storage.files import DamagedFileError, FileStore
-from app.storage.tables import NAMED, Export, Format, Registration
+from app.storage.tables import NAMED, Export, Registration
 from app.storage.unfinished import unfinished
 from registration_core.geometry import pose
 
@@ -58,7 +58,7 @@ def export_dataset(
     dataset_id: int,
     target: Path,
     progress: Progress,
-    export_format: Format = "bop",
+    format_name: str = "bop",
     choice: Choice = EVERYTHING,
 ) -> ExportSummary:
     """Write, check and pack a dataset; `target` is a zip file if it ends in .zip, else a new folder.
@@ -71,7 +71,7 @@ def export_dataset(
         dataset_id: Of the dataset.
         target: What is written.
         progress: Told how far it is.
-        export_format: "bop", the whole dataset, or "csv", its poses alone, which went through the same gate.
+        format_name: What it is given as, one of `formats()`; all went through the same gate.
         choice: Which part of the dataset.
 
     Raises:
@@ -85,10 +85,11 @@ def export_dataset(
         selection = select_dataset(session, dataset_id, choice)
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary_folder(target.parent / f".{target.name}.part") as work:
-        folder = work / folder_name(selection)
-        write_checked(database, files, selection, folder, progress)
-        if export_format == "csv":
-            folder = only_results(folder, work)
+        checked, folder = (work / state / folder_name(selection) for state in ("checked", "given"))
+        for path in (checked, folder):
+            path.parent.mkdir()
+        write_checked(database, files, selection, checked, progress)
+        formats()[format_name].write(checked, folder)
         if target.suffix == ".zip":
             packed = work / "packed.zip"
             pack(folder, packed, part(progress, CHECKING, 1.0, "packing"))
@@ -98,14 +99,6 @@ def export_dataset(
     progress(1.0, "done")
     images = sum(len(scene.images) for scene in selection.scenes)
     return ExportSummary(folder.name, len(selection.scenes), images, len(selection.annotations))
-
-
-def only_results(folder: Path, work: Path) -> Path:
-    """A folder of the same name with the poses of a checked dataset alone."""
-    kept = work / "results" / folder.name
-    kept.mkdir(parents=True)
-    write_results(folder, kept / f"{folder.name}-poses.csv")
-    return kept
 
 
 def write_checked(

@@ -14,7 +14,7 @@ from app.config import Settings
 from app.export.content.selection import EVERYTHING, Choice
 from app.storage.database import Database
 from app.storage.faults import told
-from app.storage.tables import Export, Format
+from app.storage.tables import Export
 from app.storage.unfinished import clear_unfinished
 
 logger = logging.getLogger(__name__)
@@ -45,16 +45,14 @@ class ExportJobs:
         """Say of exports that an earlier run of the server left unfinished that they failed."""
         self._fail(UNFINISHED, INTERRUPTED)
 
-    def start(
-        self, dataset_id: int, export_format: Format, user_id: int, choice: Choice = EVERYTHING
-    ) -> Export:
+    def start(self, dataset_id: int, format_name: str, user_id: int, choice: Choice = EVERYTHING) -> Export:
         """Queue an export of a dataset, or of a part of it."""
         kept = {
             "scene_ids": None if choice.scene_ids is None else sorted(choice.scene_ids),
             "without": sorted(choice.without),
         }
         with self._database.write() as session:
-            row = Export(dataset_id=dataset_id, format=export_format, choice=kept, user_id=user_id)
+            row = Export(dataset_id=dataset_id, format=format_name, choice=kept, user_id=user_id)
             session.add(row)
             session.flush()
         self._queue.submit(self._run, row.id)

@@ -43,9 +43,6 @@ FrameUse = Literal["auto", "current"]
 Method = Literal["default", "paper"]
 """What a snap is computed with: the fast default, or the particle filter of the paper."""
 
-Format = Literal["bop", "csv"]
-"""What an export gives: a whole dataset, or its poses alone."""
-
 
 class UtcDateTime(TypeDecorator[datetime]):
     """A moment with its time zone, also on databases that keep none."""
@@ -360,7 +357,8 @@ class Export(Base):
     __tablename__ = "exports"
     id: Mapped[int] = mapped_column(primary_key=True)
     dataset_id: Mapped[int] = mapped_column(ForeignKey("datasets.id"))
-    format: Mapped[Format] = mapped_column(String(20))
+    format: Mapped[str] = mapped_column(String(20))
+    """What it is given as: a name of `app.export.formats`."""
     state: Mapped[str] = mapped_column(String(20), default="queued")
     progress: Mapped[float] = mapped_column(Float, default=0.0)
     message: Mapped[str] = mapped_column(String(2000), default="")

@@ -1,1 +1,1 @@
-"""The files of an export."""
+"""What an export can be given as: a format a file, known by lying here."""

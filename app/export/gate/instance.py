@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from app.export.formats.coco import mask_from_run_lengths
+from app.export.bop.coco import mask_from_run_lengths
 from app.export.gate.raycasting import RayCaster
 from registration_core import Intrinsics
 

@@ -193,7 +193,7 @@ def test_poses_alone_are_those_of_the_dataset(site: Site, tmp_path: Path) -> Non
     site.submit_all()
     export(site, tmp_path / "whole")
     export_dataset(
-        site.database, site.files, site.dataset_id, tmp_path / "poses", ignore_progress, export_format="csv"
+        site.database, site.files, site.dataset_id, tmp_path / "poses", ignore_progress, format_name="csv"
     )
     (path,) = (tmp_path / "poses").iterdir()
     with path.open(newline="") as stream:

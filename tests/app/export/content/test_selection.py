@@ -5,8 +5,8 @@ from datetime import datetime, timedelta
 import numpy as np
 import pytest
 
+from app.export.bop.dataset_info import dataset_info
 from app.export.content.selection import ExportError, Selection, select_dataset
-from app.export.formats.dataset_info import dataset_info
 from app.storage.clock import Clock
 from app.storage.event_log import EventLog, NewEvent
 from app.storage.roles import Actor

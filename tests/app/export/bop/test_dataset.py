@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.export.formats.coco import mask_from_run_lengths
+from app.export.bop.coco import mask_from_run_lengths
 from app.export.gate.raycasting import RayCaster
 from app.storage.tables import Frame, Object
 from registration_core.bop.dataset import BopDataset, BopImage, read_dataset, read_depth

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from app.export.formats.coco import CocoScene, full_box, mask_from_run_lengths, run_lengths
+from app.export.bop.coco import CocoScene, full_box, mask_from_run_lengths, run_lengths
 
 
 def test_run_lengths_go_down_the_columns_and_begin_outside() -> None:

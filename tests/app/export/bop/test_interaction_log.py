@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from app.export.formats.interaction_log import LOOSE_FIELDS, ROWS_AT_ONCE, write_interaction_log
+from app.export.bop.interaction_log import LOOSE_FIELDS, ROWS_AT_ONCE, write_interaction_log
 from app.storage.tables import Dataset, EstimateRow, Event, Frame
 from registration_core.geometry import pose
 from tests.app.export.site import POSED, START, TOOL, Site, true_pose

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from app.export.bop.models import evenly_sampled, write_models
 from app.export.content.selection import ExportObject
-from app.export.formats.models import evenly_sampled, write_models
 from app.storage.files import FileStore
 from registration_core import ObjectModel, Symmetries
 from tests.app.export.site import TOOL, mesh_of, model_of

@@ -5,6 +5,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from app.export.formats.registry import ExportFormat
+
 COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 """Of the BOP challenge's result files."""
 SCORE = 1.0
@@ -12,9 +14,10 @@ TIME = -1
 """Seconds; -1 says that none was taken."""
 
 
-def write_results(dataset: Path, target: Path) -> None:
-    """Write the poses of a checked BOP dataset folder: R row by row, t in mm, model to camera."""
-    with target.open("w", newline="", encoding="utf-8") as stream:
+def write_poses(dataset: Path, target: Path) -> None:
+    """Write the poses of a checked BOP dataset into a new folder: R row by row, t in mm, model to camera."""
+    target.mkdir()
+    with (target / f"{target.name}-poses.csv").open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(COLUMNS)
         for path in sorted(dataset.glob("*/*/scene_gt.json")):
@@ -23,3 +26,6 @@ def write_results(dataset: Path, target: Path) -> None:
                 for truth in truths:
                     R, t = (" ".join(map(repr, truth[key])) for key in ("cam_R_m2c", "cam_t_m2c"))
                     writer.writerow((int(path.parent.name), image_id, truth["obj_id"], SCORE, R, t, TIME))
+
+
+FORMAT = ExportFormat("csv", "Poses alone, CSV", write_poses)

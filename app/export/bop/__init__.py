@@ -1,0 +1,1 @@
+"""Writes a dataset in the form of BOP, with its interaction log."""
