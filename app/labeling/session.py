@@ -31,9 +31,10 @@ from app.labeling.permissions import (
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.session_lock import SessionLock
 from app.labeling.session_state import SessionState
-from app.labeling.snaps.find import Region, RequestSearch, Search
+from app.labeling.snaps.find import Region, Search, SearchOrder, SearchResult
 from app.labeling.snaps.machine import Machine
-from app.labeling.snaps.snap_exchange import ChooseFrames, RequestSnap
+from app.labeling.snaps.request import Submit
+from app.labeling.snaps.snap_exchange import ChooseFrames, SnapOrder, SnapResult
 from app.labeling.snaps.start_spread import StartSpread, Unsaid
 from app.storage.event_log import STATE_AFTER, NewEvent
 from app.storage.roles import Actor
@@ -81,8 +82,8 @@ class LabelingSession:
         condition: Condition,
         same_pose: SamePose,
         record_event: RecordEvent,
-        request_snap: RequestSnap,
-        request_search: RequestSearch,
+        request_snap: Submit[SnapOrder, SnapResult],
+        request_search: Submit[SearchOrder, SearchResult],
         choose_frames: ChooseFrames,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,

@@ -3,15 +3,14 @@
 import secrets
 import uuid
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass
 
 from app.labeling.moves.pose_record import PoseRecord
 from app.labeling.permissions import Tool, require
 from app.labeling.scene.known_object import KnownObject
+from app.labeling.snaps.request import Request, Submit
 from app.labeling.snaps.snap_exchange import SnapFailure, SnapStatus, stored_known
 from app.storage.event_log import NewEvent
-from app.storage.faults import told
 from app.storage.roles import Actor
 from registration_core import Hypothesis, SnapConfig
 
@@ -44,24 +43,13 @@ class SearchResult:
     hardware: str
 
 
-class RequestSearch(Protocol):
-    """Hands an order to the workers and returns a function that cancels it, as `RequestSnap` does."""
-
-    def __call__(
-        self,
-        order: SearchOrder,
-        on_progress: Callable[[float], None],
-        on_end: Callable[[SearchResult | SnapFailure], None],
-    ) -> Callable[[], None]: ...
-
-
 class Search:
     """The newest search of a session, which lets nobody in while somebody else is.
 
     Args:
         record: Where it is written down.
         tools: What may be used on this task.
-        request_search: Hands an order to the workers.
+        submit: Hands an order to the workers.
         known_objects: Tells what is known of other objects in the scene.
     """
 
@@ -69,16 +57,18 @@ class Search:
         self,
         record: PoseRecord,
         tools: Collection[Tool],
-        request_search: RequestSearch,
+        submit: Submit[SearchOrder, SearchResult],
         known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
         self._record = record
         self._tools = tools
-        self._request_search = request_search
         self._known_objects = known_objects
-        self._cancel: Callable[[], None] | None = None
-        self.status: SnapStatus | None = None
+        self._request = Request(submit, "candidates")
+
+    @property
+    def status(self) -> SnapStatus | None:
         """Of the last search; None once its candidates were taken or put away."""
+        return self._request.status
 
     def start(self, actor: Actor, region: Region | None, config: SnapConfig, seed: int | None) -> str:
         """Look for the object; returns the search's id. See `LabelingSession.search`."""
@@ -100,51 +90,26 @@ class Search:
             "known_objects": stored_known(order.known),
         }
         self._record.record(NewEvent("search_requested", actor, snap_id=order.search_id, detail=detail))
-        self.status = SnapStatus(order.search_id, actor)
-        self._cancel = self._request_search(
-            order,
-            lambda share: self._began(order),
-            lambda outcome: self._ended(order, outcome),
-        )
+
+        def settle(outcome: SearchResult | SnapFailure) -> None:
+            self._record.record(_outcome_event(order, outcome))
+
+        self._request.start(order, SnapStatus(order.search_id, actor), settle)
         return order.search_id
 
     def abandon(self, actor: Actor, reason: str) -> None:
         """Stop the search that is under way; nothing happens where there is none."""
-        if self.status is None or not self.status.is_live:
-            return
-        assert self._cancel is not None
         detail = {"reason": reason}
-        self._record.record(NewEvent("search_cancelled", actor, snap_id=self.status.id, detail=detail))
-        self._cancel()
-        self.status = replace(self.status, state="cancelled")
+        self._request.abandon(
+            lambda search_id: self._record.record(
+                NewEvent("search_cancelled", actor, snap_id=search_id, detail=detail)
+            )
+        )
 
     def put_away(self) -> None:
         """Forget the candidates of a search that has ended."""
-        if self.status is not None and not self.status.is_live:
-            self.status = None
-
-    def _began(self, order: SearchOrder) -> None:
-        if self._is_current(order):
-            assert self.status is not None
-            self.status = replace(self.status, state="running")
-
-    def _ended(self, order: SearchOrder, outcome: SearchResult | SnapFailure) -> None:
-        if not self._is_current(order):
-            return
-        assert self.status is not None
-        try:
-            self._record.record(_outcome_event(order, outcome))
-        except Exception as error:
-            message = f"The candidates could not be saved: {told(error)}."
-            self.status = replace(self.status, state="failed", message=message)
-            raise
-        if isinstance(outcome, SnapFailure):
-            self.status = replace(self.status, state="failed", message=str(outcome))
-        else:
-            self.status = replace(self.status, state="done", progress=1.0)
-
-    def _is_current(self, order: SearchOrder) -> bool:
-        return self.status is not None and self.status.id == order.search_id and self.status.is_live
+        if not self._request.is_under_way:
+            self._request.status = None
 
 
 def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> NewEvent:

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.labeling.moves.pose_record import Array
-from app.labeling.snaps.snap_exchange import Offer, RequestSnap, SnapFailure, SnapOrder, SnapResult
+from app.labeling.snaps.request import Request, Submit
+from app.labeling.snaps.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.storage.roles import Actor
 
 
 @dataclass(frozen=True)
@@ -15,22 +17,27 @@ class Look:
 
     order: SnapOrder
     result: SnapResult
-    offer: Offer
+
+    @property
+    def offer(self) -> Offer:
+        """As it is shown."""
+        order, result = self.order, self.result
+        return Offer(
+            order.snap_id, order.T_world_object, result.T_world_object, result.assessment, quiet=True
+        )
 
 
 class LiveSnap:
     """Follows the object while it is on; what it finds is shown, and kept only where it is accepted.
 
     Args:
-        request_snap: Hands an order to the workers.
+        submit: Hands an order to the workers.
     """
 
-    def __init__(self, request_snap: RequestSnap) -> None:
-        self._request_snap = request_snap
+    def __init__(self, submit: Submit[SnapOrder, SnapResult]) -> None:
+        self._request = Request(submit, "look")
         self._sought: SnapOrder | None = None
         """The newest order."""
-        self._cancel: Callable[[], None] | None = None
-        """Ends the one that is under way."""
         self.is_on = False
         self.found: Look | None = None
 
@@ -42,19 +49,19 @@ class LiveSnap:
             frame_id: The frame to snap against.
             order: Makes the order, where one is needed.
         """
-        if not self.is_on or self._cancel is not None or self._was_sought(T_world_object, frame_id):
+        if not self.is_on or self._request.is_under_way or self._was_sought(T_world_object, frame_id):
             return
         sought = self._sought = order()
-        self._cancel = _nothing
-        cancel = self._request_snap(sought, lambda share: None, lambda outcome: self._ended(sought, outcome))
-        if self._cancel is not None:  # else it has ended already
-            self._cancel = cancel
+
+        def settle(outcome: SnapResult | SnapFailure) -> None:
+            self.found = None if isinstance(outcome, SnapFailure) else Look(sought, outcome)
+
+        self._request.start(sought, SnapStatus(sought.snap_id, Actor.MACHINE), settle)
 
     def rest(self) -> None:
         """Show nothing, and let go of a look under way."""
-        if self._cancel is not None:
-            self._cancel()
-        self._cancel = self._sought = self.found = None
+        self._request.drop()
+        self._sought = self.found = None
 
     def _was_sought(self, T_world_object: Array, frame_id: int) -> bool:
         sought = self._sought
@@ -63,21 +70,3 @@ class LiveSnap:
             and sought.frame_id == frame_id
             and np.array_equal(sought.T_world_object, T_world_object)
         )
-
-    def _ended(self, order: SnapOrder, outcome: SnapResult | SnapFailure) -> None:
-        if order is not self._sought:
-            return
-        self._cancel = None
-        if isinstance(outcome, SnapFailure):
-            self.found = None
-        else:
-            offer = _offer(order, outcome)
-            self.found = Look(order, outcome, offer)
-
-
-def _offer(order: SnapOrder, result: SnapResult) -> Offer:
-    return Offer(order.snap_id, order.T_world_object, result.T_world_object, result.assessment, quiet=True)
-
-
-def _nothing() -> None:
-    """Cancels what has not begun."""

@@ -11,10 +11,11 @@ from app.labeling.moves.pose_record import ActionError, Array, PoseRecord, said_
 from app.labeling.permissions import Tool, Wanted, require, require_frames, require_method
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.live_snap import LiveSnap
+from app.labeling.snaps.request import Request, Submit
 from app.labeling.snaps.snap_exchange import (
     ChooseFrames,
+    FramesReport,
     Offer,
-    RequestSnap,
     SnapFailure,
     SnapFrames,
     SnapOrder,
@@ -28,7 +29,6 @@ from app.labeling.snaps.snap_exchange import (
 )
 from app.labeling.snaps.start_spread import StartSpread, Unsaid, spread_from_drags
 from app.storage.event_log import NewEvent
-from app.storage.faults import told
 from app.storage.roles import Actor
 from app.storage.tables import FrameUse, Method
 from app.workers.methods import method_of
@@ -54,7 +54,7 @@ class Machine:
         default: the operator does not wait for it.
         takes_turns: Whether it looks for a better pose whenever the operator lets go.
         same_pose: Tells whether the operator has seen a result before.
-        request_snap: Hands an order to the workers.
+        submit: Hands an order to the workers.
         choose_frames: Chooses the frames of a snap.
         known_objects: Tells what is known of other objects in the scene.
     """
@@ -68,7 +68,7 @@ class Machine:
         frame_uses: Sequence[FrameUse],
         takes_turns: bool,
         same_pose: SamePose,
-        request_snap: RequestSnap,
+        submit: Submit[SnapOrder, SnapResult],
         choose_frames: ChooseFrames,
         known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
@@ -79,18 +79,20 @@ class Machine:
         self._frame_uses = frame_uses
         self._takes_turns = takes_turns
         self._same_pose = same_pose
-        self._request_snap = request_snap
         self._choose_frames = choose_frames
         self._known_objects = known_objects
-        self._cancel: Callable[[], None] | None = None
-        self._live = LiveSnap(request_snap)
+        self._request = Request(submit, "result")
+        self._live = LiveSnap(submit)
         self._taken_over: list[Array] = []
         """Poses that the machine put the object at by itself."""
-        self.status: SnapStatus | None = None
-        """Of the last snap."""
         self.offer: Offer | None = None
         self.frame_use = frame_uses[0]
         """The frames that a snap uses where it is not asked otherwise."""
+
+    @property
+    def status(self) -> SnapStatus | None:
+        """Of the last snap."""
+        return self._request.status
 
     def snap(
         self,
@@ -126,15 +128,11 @@ class Machine:
                 },
             )
         )
-        self.status = SnapStatus(order.snap_id, actor, method=method)
         self.offer = None
         self._record.message = None
         then = self._record.history.current
-        self._cancel = self._request_snap(
-            order,
-            lambda share: self._progressed(order.snap_id, share),
-            lambda outcome: self._ended(order, then, outcome),
-        )
+        status = SnapStatus(order.snap_id, actor, method=method)
+        self._request.start(order, status, lambda outcome: self._settle(order, then, actor, outcome))
         return order.snap_id
 
     @property
@@ -160,10 +158,9 @@ class Machine:
         record = self._record
         if self.live is not None:
             self.offer = None  # one pose at a time, the newest
-        snapping = self.status is not None and self.status.is_live
         by_hand = record.drag is not None or record.history.current.confidence is None
         offered = self.offer is not None and record.drag is None
-        if self.is_live and is_open and by_hand and not snapping and not offered:
+        if self.is_live and is_open and by_hand and not self._request.is_under_way and not offered:
             self._live.follow(record.T_world_object, record.frame_id, self._live_order)
         else:
             self._live.rest()
@@ -175,14 +172,12 @@ class Machine:
 
     def abandon(self, actor: Actor, reason: str) -> None:
         """Stop the snap that is under way; nothing happens where there is none."""
-        if self.status is None or not self.status.is_live:
-            return
-        assert self._cancel is not None
-        self._record.record(
-            NewEvent(kind="snap_cancelled", actor=actor, snap_id=self.status.id, detail={"reason": reason})
+        detail = {"reason": reason}
+        self._request.abandon(
+            lambda snap_id: self._record.record(
+                NewEvent("snap_cancelled", actor, snap_id=snap_id, detail=detail)
+            )
         )
-        self._cancel()
-        self.status = replace(self.status, state="cancelled")
 
     def close(self) -> None:
         """Stop whatever is under way, for good, also where that cannot be written down."""
@@ -191,8 +186,7 @@ class Machine:
         try:
             self.abandon(Actor.MACHINE, "session closed")
         except Exception:
-            assert self._cancel is not None
-            self._cancel()
+            self._request.drop()
             raise
 
     def accept(self, actor: Actor) -> None:
@@ -237,29 +231,18 @@ class Machine:
             wanted = "current"  # the paper's filter knows one view
         return self._choose_frames(order.frame_id, order.T_world_object, order.known, wanted)
 
-    def _progressed(self, snap_id: str, share: float) -> None:
-        if self._is_current(snap_id):
-            assert self.status is not None
-            progress = max(self.status.progress, min(1.0, share))
-            self.status = replace(self.status, state="running", progress=progress)
+    def _settle(
+        self, order: SnapOrder, then: Step, asked_by: Actor, outcome: SnapResult | SnapFailure
+    ) -> FramesReport | None:
+        """Write down what came of a snap and, where it may, put the object there."""
+        if isinstance(outcome, SnapFailure):
+            detail = {"message": str(outcome)}
+            self._record.record(NewEvent("snap_failed", Actor.MACHINE, snap_id=order.snap_id, detail=detail))
+            return None
+        return self._take(order, then, asked_by, outcome)
 
-    def _ended(self, order: SnapOrder, then: Step, outcome: SnapResult | SnapFailure) -> None:
-        if not self._is_current(order.snap_id):
-            return
-        assert self.status is not None
-        try:
-            if isinstance(outcome, SnapFailure):
-                self._fail(order, str(outcome))
-            else:
-                self._take(order, then, outcome)
-        except Exception as error:
-            message = f"The result could not be saved: {told(error)}."
-            self.status = replace(self.status, state="failed", message=message)
-            raise
-
-    def _take(self, order: SnapOrder, then: Step, result: SnapResult) -> None:
-        assert self.status is not None
-        unasked = self.status.asked_by is Actor.MACHINE
+    def _take(self, order: SnapOrder, then: Step, asked_by: Actor, result: SnapResult) -> FramesReport:
+        unasked = asked_by is Actor.MACHINE
         moved = self._record.drag is not None or self._record.history.current is not then
         withheld = MOVED_ON if moved else self._hesitates(result) if unasked else None
         step = _step(result.T_world_object, result.assessment, order.snap_id)
@@ -291,8 +274,7 @@ class Machine:
                 unasked,
                 withheld,
             )
-        report = frames_report(order, result.estimate)
-        self.status = replace(self.status, state="done", progress=1.0, frames=report)
+        return frames_report(order, result.estimate)
 
     def _hesitates(self, result: SnapResult) -> str | None:
         """Why the machine does not take over by itself; None where it does."""
@@ -301,21 +283,6 @@ class Machine:
         # What the operator took back, by undo or by dragging on, is not forced on them again.
         taken_back = any(self._same_pose(result.T_world_object, T) for T in self._taken_over)
         return TAKEN_BACK if taken_back else None
-
-    def _fail(self, order: SnapOrder, message: str) -> None:
-        assert self.status is not None
-        self._record.record(
-            NewEvent(
-                kind="snap_failed",
-                actor=Actor.MACHINE,
-                snap_id=order.snap_id,
-                detail={"message": message},
-            )
-        )
-        self.status = replace(self.status, state="failed", message=message)
-
-    def _is_current(self, snap_id: str) -> bool:
-        return self.status is not None and self.status.id == snap_id and self.status.is_live
 
     def _require_offer(self) -> Offer:
         if self.offer is None:

@@ -1,6 +1,5 @@
 """What a session and the machine tell each other about a snap."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Protocol
 
@@ -69,20 +68,6 @@ class SnapResult:
 
 class SnapFailure(Exception):  # noqa: N818 - an outcome that is handed over, not raised
     """Why a snap came to nothing; the message may be shown."""
-
-
-class RequestSnap(Protocol):
-    """Hands an order to the workers and returns a function that cancels it.
-
-    `on_progress` gets shares in [0, 1]; `on_end` is called once, from any thread, unless cancelled before.
-    """
-
-    def __call__(
-        self,
-        order: SnapOrder,
-        on_progress: Callable[[float], None],
-        on_end: Callable[[SnapResult | SnapFailure], None],
-    ) -> Callable[[], None]: ...
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ LIVE_PRIORITY = -1
 
 
 class Dispatch:
-    """`snap` and `search` are what a session is handed as `RequestSnap` and `RequestSearch`.
+    """`snap` and `search` are what a session submits its orders to.
 
     Args:
         snapper: Runs jobs.

@@ -12,7 +12,8 @@ from app.labeling.scene.known_object import KnownObject
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
 from app.labeling.snaps.find import SearchOrder, SearchResult
-from app.labeling.snaps.snap_exchange import RequestSnap, SnapFailure, SnapFrames, SnapOrder, SnapResult
+from app.labeling.snaps.request import Submit
+from app.labeling.snaps.snap_exchange import SnapFailure, SnapFrames, SnapOrder, SnapResult
 from app.storage.event_log import NewEvent
 from app.storage.tables import Condition, EstimateRow, Method
 from registration_core import Ambiguity, Certificates, Check, Estimate, Hypothesis
@@ -146,7 +147,7 @@ class Bench:
         state: str = "open",
         condition: Condition = "snap",
         in_study: bool = False,
-        request_snap: RequestSnap | None = None,
+        request_snap: Submit[SnapOrder, SnapResult] | None = None,
         method: Method = "default",
     ) -> None:
         self.log = Log()
