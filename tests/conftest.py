@@ -10,6 +10,18 @@ settings.load_profile("untimed")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
+SLOW_FIXTURES = frozenset({"cluster", "server", "postgres_server", "shared_data", "shared_cases"})
+"""What takes workers, a server, a database server or real data: `./scripts/test fast` leaves its tests out."""
+SLOW_FOLDERS = frozenset({"benchmarks", "e2e"})
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow by what it needs; what computes long is marked where it stands."""
+    for item in items:
+        folder = item.path.relative_to(REPOSITORY / "tests").parts[0]
+        if folder in SLOW_FOLDERS or SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.slow)
+
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:

@@ -3,10 +3,12 @@
 import ast
 import importlib
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
+import app
 from tests.conftest import REPOSITORY
 
 PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").glob("*.md")])
@@ -59,6 +61,13 @@ def test_examples_import_what_there_is(page):
             ):
                 module = importlib.import_module(node.module)
                 assert all(hasattr(module, alias.name) for alias in node.names), ast.unparse(node)
+
+
+def test_the_version_is_the_same_wherever_it_is_told():
+    version = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["version"]
+    released = re.findall(r"^## \[(\d[\d.]*)\]", (REPOSITORY / "CHANGELOG.md").read_text(), re.MULTILINE)
+    cited = re.findall(r"^version: (.*)$", (REPOSITORY / "CITATION.cff").read_text(), re.MULTILINE)
+    assert [version] == released[:1] == cited == [app.__version__]
 
 
 def test_the_rules_find_what_is_wrong(tmp_path):

@@ -144,12 +144,12 @@ Choice = Annotated[str | None, Query(max_length=500)]
 """A name that something has to have; all where it is left out."""
 
 
-def my_seat(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> LiveSession:
+def my_live_session(registration_id: Id, services: ServicesDep, identity: AnyoneDep) -> LiveSession:
     """The caller's own live session."""
     return services.live_sessions.open(registration_id, identity)
 
 
-LiveSessionDep = Annotated[LiveSession, Depends(my_seat)]
+LiveSessionDep = Annotated[LiveSession, Depends(my_live_session)]
 
 
 def check_sees(services: Services, identity: Identity, what: ColumnElement[bool], name: str) -> None:

@@ -58,7 +58,7 @@ async def fetched(request: Request, view: Path, path: str) -> Response:
 async def view_socket(socket: WebSocket, registration_id: Id) -> None:
     """The view's messages, both ways, unread."""
     services = get_services(socket)
-    live_session = await asyncio.to_thread(_allowed_seat, socket, registration_id)
+    live_session = await asyncio.to_thread(_allowed_session, socket, registration_id)
     if live_session is None:
         await socket.close(REFUSED)
         return
@@ -70,7 +70,7 @@ async def view_socket(socket: WebSocket, registration_id: Id) -> None:
         leave()
 
 
-def _allowed_seat(socket: WebSocket, registration_id: int) -> LiveSession | None:
+def _allowed_session(socket: WebSocket, registration_id: int) -> LiveSession | None:
     if not is_same_origin(socket, required=True):
         return None
     identity = identify(socket)
