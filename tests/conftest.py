@@ -11,7 +11,7 @@ settings.load_profile("untimed")
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 SLOW_FIXTURES = frozenset({"cluster", "server", "postgres_server", "shared_data", "shared_cases"})
-"""What takes workers, a server, a database server or real data: `./scripts/test fast` leaves its tests out."""
+"""What takes workers, a server, a database server or real data; `./scripts/test fast` leaves it out."""
 SLOW_FOLDERS = frozenset({"benchmarks", "e2e"})
 
 

@@ -57,7 +57,7 @@ class LiveServer:
         auth = self.services.auth
         return auth.sign_in_with_link(auth.create_link(auth.ensure_user(name, role).id))
 
-    def open(self, registration_id: int) -> LiveSession:
+    def live_session(self, registration_id: int) -> LiveSession:
         """The live session of a registration."""
         return self.services.live_sessions._sessions[registration_id]
 
