@@ -13,9 +13,9 @@ from app.storage.database import Database
 from tests.app.analysis.hand_made import at
 from tests.app.analysis.hand_made_study import HandMadeStudy
 from tests.e2e.gizmo import view_frame
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_report import log_of
-from tests.e2e.test_trial import participant_link
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.participants import participant_link
+from tests.e2e.study_logs import log_of
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -51,9 +51,11 @@ def admin(server: Server, open_page: Callable[[str], Page], request: pytest.Fixt
 
 
 @pytest.fixture
-def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Desk:
+def labelling(
+    server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest
+) -> LabellingPage:
     """A new operator before a task."""
-    return Desk(open_page(server.new_link(re.sub(r"\W", "-", request.node.name)[:60])), server)
+    return LabellingPage(open_page(server.new_link(re.sub(r"\W", "-", request.node.name)[:60])), server)
 
 
 def test_axe_finds_a_fault_where_there_is_one(admin: Page) -> None:
@@ -86,73 +88,73 @@ def test_of_the_sign_in_page(server: Server, open_page: Callable[[str], Page]) -
     expect_accessible(page)
 
 
-def test_of_a_labelling_page(desk: Desk) -> None:
-    page = desk.page
+def test_of_a_labelling_page(labelling: LabellingPage) -> None:
+    page = labelling.page
     page.locator("#precision summary").click()
     expect_accessible(page)
     page.keyboard.press("Space")
-    desk.events("snap_applied")
+    labelling.events("snap_applied")
     expect(page.locator("#confidence-number")).not_to_have_text("–")
     expect_accessible(page)
-    desk.submit()
+    labelling.submit()
     expect(page.locator("#next-task")).to_be_visible()
     expect_accessible(page)
-    assert page.request.post(f"{desk.url}/reopen").ok  # snaps of other tests would pass it by
+    assert page.request.post(f"{labelling.url}/reopen").ok  # snaps of other tests would pass it by
 
 
-def test_of_the_help(desk: Desk) -> None:
-    desk.page.keyboard.press("?")
-    expect(desk.page.locator("#keys")).to_be_visible()
-    expect_accessible(desk.page)
+def test_of_the_help(labelling: LabellingPage) -> None:
+    labelling.page.keyboard.press("?")
+    expect(labelling.page.locator("#keys")).to_be_visible()
+    expect_accessible(labelling.page)
 
 
-def test_of_the_first_steps(desk: Desk) -> None:
-    desk.page.locator("#help").click()
-    desk.page.get_by_role("button", name="Show me around").click()
-    expect(desk.page.locator("#guide")).to_be_visible()
-    expect_accessible(desk.page)
+def test_of_the_first_steps(labelling: LabellingPage) -> None:
+    labelling.page.locator("#help").click()
+    labelling.page.get_by_role("button", name="Show me around").click()
+    expect(labelling.page.locator("#guide")).to_be_visible()
+    expect_accessible(labelling.page)
 
 
-def test_of_the_reasons_to_skip(desk: Desk) -> None:
-    desk.page.keyboard.press("Shift+Enter")
-    expect(desk.page.locator("#skip-dialog")).to_be_visible()
-    expect_accessible(desk.page)
+def test_of_the_reasons_to_skip(labelling: LabellingPage) -> None:
+    labelling.page.keyboard.press("Shift+Enter")
+    expect(labelling.page.locator("#skip-dialog")).to_be_visible()
+    expect_accessible(labelling.page)
 
 
 def test_of_copies(server: Server, open_page: Callable[[str], Page]) -> None:
-    first = Desk(open_page(server.new_link("one-to-copy-from")), server, "mug")
+    first = LabellingPage(open_page(server.new_link("one-to-copy-from")), server, "mug")
     first.submit()
-    page = Desk(open_page(server.new_link("one-who-copies")), server, "mug").page
+    page = LabellingPage(open_page(server.new_link("one-who-copies")), server, "mug").page
     page.keyboard.press("c")
     expect(page.locator("#copy-list")).to_contain_text("one-to-copy-from")
     expect_accessible(page)
     assert first.page.request.post(f"{first.url}/reopen").ok
 
 
-def test_of_nothing_to_copy(desk: Desk) -> None:
-    desk.page.route("**/copies", lambda route: route.fulfill(json={"items": []}))
-    desk.page.keyboard.press("c")
-    expect(desk.page.locator("#copies-none")).to_be_visible()
-    expect_accessible(desk.page)
+def test_of_nothing_to_copy(labelling: LabellingPage) -> None:
+    labelling.page.route("**/copies", lambda route: route.fulfill(json={"items": []}))
+    labelling.page.keyboard.press("c")
+    expect(labelling.page.locator("#copies-none")).to_be_visible()
+    expect_accessible(labelling.page)
 
 
-def test_of_a_tab_that_another_took_over(desk: Desk) -> None:
-    newer = desk.page.context.new_page()
-    newer.goto(desk.page_url)
-    expect(desk.page.locator("#closed")).to_contain_text("opened in another tab")
-    expect_accessible(desk.page)
+def test_of_a_tab_that_another_took_over(labelling: LabellingPage) -> None:
+    newer = labelling.page.context.new_page()
+    newer.goto(labelling.page_url)
+    expect(labelling.page.locator("#closed")).to_contain_text("opened in another tab")
+    expect_accessible(labelling.page)
 
 
-def test_of_a_replay(desk: Desk) -> None:
-    page = desk.page
-    desk.drag("tx", 0.02)
-    desk.submit()
+def test_of_a_replay(labelling: LabellingPage) -> None:
+    page = labelling.page
+    labelling.drag("tx", 0.02)
+    labelling.submit()
     page.locator("#replay").click()
     page.wait_for_url("**/replay/*")
     view_frame(page)
     expect(page.locator("#events")).to_contain_text("Submitted")
     expect_accessible(page)
-    assert page.request.post(f"{desk.url}/reopen").ok
+    assert page.request.post(f"{labelling.url}/reopen").ok
 
 
 def test_of_a_study_and_its_participants(

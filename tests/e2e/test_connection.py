@@ -11,8 +11,7 @@ from app.labeling.session import BROKEN_DRAG
 from tests.e2e.breakable import BreakableWay, breakable_way
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import expect_new_view, view_frame
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_machine import hold
+from tests.e2e.labelling_page import LabellingPage, hold
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -29,63 +28,65 @@ def way(server: Server) -> Iterator[BreakableWay]:
 
 
 @pytest.fixture
-def desk(way: BreakableWay, server: Server, open_page: Callable[[str], Page], request) -> Desk:
+def labelling(way: BreakableWay, server: Server, open_page: Callable[[str], Page], request) -> LabellingPage:
     behind = replace(server, url=way.url)
-    return Desk(open_page(behind.new_link(request.node.name.replace("_", "-")[:60])), behind)
+    return LabellingPage(open_page(behind.new_link(request.node.name.replace("_", "-")[:60])), behind)
 
 
-def test_a_view_that_lost_its_connection_gets_another(desk: Desk, way: BreakableWay) -> None:
-    page = desk.page
-    kept = desk.drag("tx", 0.02)["T_after"]
+def test_a_view_that_lost_its_connection_gets_another(labelling: LabellingPage, way: BreakableWay) -> None:
+    page = labelling.page
+    kept = labelling.drag("tx", 0.02)["T_after"]
     page.locator("#undo").focus()  # away from the view, which reconnects only while it has the focus
-    expect_new_view(desk.frame)
+    expect_new_view(labelling.frame)
     way.refused = VIEW
     assert way.cut(VIEW)
     expect(page.locator("#view-lost")).to_be_visible(timeout=SLOWEST)
     expect(page.locator("#connection")).to_be_hidden()
     take_picture(page, "label-view-lost")
     page.keyboard.press("Control+z")
-    desk.events("undo")
+    labelling.events("undo")
     way.refused = None
     expect(page.locator("#view-lost")).to_be_hidden(timeout=SLOWEST)
-    desk.frame = view_frame(page)
+    labelling.frame = view_frame(page)
     page.keyboard.press("Control+Shift+z")
-    desk.events("redo")
-    assert np.allclose(desk.pose, kept)
-    desk.drag("tz", 0.02)
+    labelling.events("redo")
+    assert np.allclose(labelling.pose, kept)
+    labelling.drag("tz", 0.02)
 
 
-def test_a_drag_that_the_connection_breaks_is_kept_and_told(desk: Desk, way: BreakableWay) -> None:
-    page, start = desk.page, desk.pose
-    hold(desk, "ty", 0.03)
+def test_a_drag_that_the_connection_breaks_is_kept_and_told(
+    labelling: LabellingPage, way: BreakableWay
+) -> None:
+    page, start = labelling.page, labelling.pose
+    hold(labelling, "ty", 0.03)
     expect(page.locator("#saved")).to_contain_text("moving")
-    expect_new_view(desk.frame)
+    expect_new_view(labelling.frame)
     way.refused = b""
     way.cut(b"")
     expect(page.locator("#connection")).to_be_visible(timeout=SLOWEST)
     page.mouse.up()
     way.refused = None
     expect(page.locator("#connection")).to_be_hidden(timeout=SLOWEST)
-    (drag,) = desk.events("drag")
+    (drag,) = labelling.events("drag")
     expect(page.locator("#message")).to_have_text(BROKEN_DRAG, timeout=SLOWEST)
-    desk.frame = view_frame(page)
+    labelling.frame = view_frame(page)
     take_picture(page, "label-broken-drag")
-    assert np.allclose(desk.pose, drag["T_after"]) and not np.allclose(desk.pose, start)
+    assert np.allclose(labelling.pose, drag["T_after"]) and not np.allclose(labelling.pose, start)
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.allclose(desk.pose, start)
+    labelling.events("undo")
+    assert np.allclose(labelling.pose, start)
     expect(page.locator("#message")).to_be_hidden()
-    desk.drag("tx", 0.02)
+    labelling.drag("tx", 0.02)
 
 
-def test_the_page_goes_on_when_the_network_comes_back(desk: Desk) -> None:
-    page = desk.page
-    kept = desk.drag("tx", 0.02)["T_after"]
+def test_the_page_goes_on_when_the_network_comes_back(labelling: LabellingPage) -> None:
+    page = labelling.page
+    kept = labelling.drag("tx", 0.02)["T_after"]
     page.context.set_offline(True)
     page.locator("#undo").click()
     expect(page.locator("#message")).to_contain_text("cannot be reached")
     page.context.set_offline(False)
     expect(page.locator("#connection")).to_be_hidden(timeout=SLOWEST)
     expect(page.locator("#undo")).to_be_enabled(timeout=SLOWEST)
-    assert np.allclose(desk.pose, kept)
-    desk.drag("tz", 0.02)
+    assert np.allclose(labelling.pose, kept)
+    labelling.drag("tz", 0.02)

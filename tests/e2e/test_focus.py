@@ -7,7 +7,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -38,19 +38,21 @@ HAS_FOCUS = "id => document.activeElement.id === id"
 
 
 @pytest.fixture
-def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Desk:
+def labelling(
+    server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest
+) -> LabellingPage:
     """A task whose page has said that all is there."""
-    desk = Desk(open_page(server.new_link(request.node.name[:50])), server)
-    expect(desk.page.locator("#submit")).to_be_enabled()
-    return desk
+    labelling = LabellingPage(open_page(server.new_link(request.node.name[:50])), server)
+    expect(labelling.page.locator("#submit")).to_be_enabled()
+    return labelling
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_ring_is_seen_wherever_it_is(
     server: Server, open_page: Callable[[str], Page], scheme: str
 ) -> None:
-    desk = Desk(open_page(server.new_link(f"ring {scheme}")), server)
-    page = desk.page
+    labelling = LabellingPage(open_page(server.new_link(f"ring {scheme}")), server)
+    page = labelling.page
     page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
     expect(page.locator("#submit")).to_be_enabled()
     page.keyboard.press("Shift")  # the keyboard is in use
@@ -61,8 +63,8 @@ def test_the_ring_is_seen_wherever_it_is(
     take_picture(page, f"focus-{scheme}")
 
 
-def test_the_view_shows_that_it_has_the_focus_and_esc_leads_to_it(desk: Desk) -> None:
-    page = desk.page
+def test_the_view_shows_that_it_has_the_focus_and_esc_leads_to_it(labelling: LabellingPage) -> None:
+    page = labelling.page
     ring = "() => getComputedStyle(document.querySelector('.stage'), '::after').borderTopStyle"
     page.locator("#reset").focus()
     page.locator("#help").focus()
@@ -73,9 +75,9 @@ def test_the_view_shows_that_it_has_the_focus_and_esc_leads_to_it(desk: Desk) ->
     take_picture(page, "focus-view")
 
 
-def test_what_lies_behind_a_notice_cannot_be_reached(desk: Desk) -> None:
-    page, other = desk.page, desk.page.context.new_page()
-    other.goto(desk.page_url)
+def test_what_lies_behind_a_notice_cannot_be_reached(labelling: LabellingPage) -> None:
+    page, other = labelling.page, labelling.page.context.new_page()
+    other.goto(labelling.page_url)
     view_frame(other)
     page.bring_to_front()
     expect(page.locator("#closed")).to_be_visible(timeout=60_000)

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -29,20 +29,20 @@ def newcomer_s_page(context: BrowserContext, server: Server, name: str) -> Page:
     """The labelling page that a new operator sees first."""
     page = context.new_page()
     page.goto(server.new_link(name))
-    return Desk(page, server).page
+    return LabellingPage(page, server).page
 
 
 def test_a_new_operator_is_shown_around_once(server: Server, context: BrowserContext) -> None:
     page = context.new_page()
     page.goto(server.new_link("newcomer"))
-    desk = Desk(page, server)
+    labelling = LabellingPage(page, server)
     card, text = page.locator("#guide"), page.locator("#guide-text")
     place = page.locator("#guide-place")
 
     expect(text).to_contain_text("Drag one of the object's arrows")
     expect(place).to_have_text("1 of 7")
     take_picture(page, "label-guide")
-    desk.drag("tx", 0.02)
+    labelling.drag("tx", 0.02)
     expect(text).to_contain_text("Turn the view")
     page.mouse.move(850, 560)
     page.mouse.down()

@@ -17,7 +17,7 @@ from registration_core.rendering.rasterizer import render_depth
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import wait_for_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -63,12 +63,12 @@ class View:
 class Image:
     """The image in the panel of a labelling page."""
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
-        self.page = desk.page
-        get = lambda path: self.page.request.get(f"{desk.root}{path}")  # noqa: E731
-        self.frames = get(f"/api/scenes/{desk.task['scene']['id']}").json()["frames"]
-        mesh = get(f"/api/objects/{desk.task['object']['id']}/mesh.ply").body()
+    def __init__(self, labelling: LabellingPage) -> None:
+        self.labelling = labelling
+        self.page = labelling.page
+        get = lambda path: self.page.request.get(f"{labelling.root}{path}")  # noqa: E731
+        self.frames = get(f"/api/scenes/{labelling.task['scene']['id']}").json()["frames"]
+        mesh = get(f"/api/objects/{labelling.task['object']['id']}/mesh.ply").body()
         self.model = ObjectModel.from_bytes(mesh, "ply", "mm")
 
     @property
@@ -99,7 +99,7 @@ class Image:
         """Put the object somewhere in the first frame."""
         T_world_object = np.array(self.frames[0]["T_world_camera"]) @ T_camera_object
         body = {"T_world_object": T_world_object.tolist()}
-        assert self.page.request.put(f"{self.desk.url}/pose", data=body).ok
+        assert self.page.request.put(f"{self.labelling.url}/pose", data=body).ok
 
     def silhouette(self, T_camera_object: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Where the object is in the first frame as it is shown, by the library."""
@@ -120,7 +120,7 @@ def mug(server: Server, browser: Browser) -> Iterator[Image]:
     page = context.new_page()
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.goto(server.new_link("operator of images"))
-    yield Image(Desk(page, server, "mug"))
+    yield Image(LabellingPage(page, server, "mug"))
     context.close()
     assert problems == []
 
@@ -155,22 +155,22 @@ def test_what_is_drawn_is_what_the_library_renders(image: Image) -> None:
 
 
 def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
-    desk, page = image.desk, image.page
-    assert page.request.post(f"{desk.url}/reset").ok
-    wait_for_picture(desk.frame)
-    expected = image.silhouette(np.array(desk.state["T_camera_object"])).nonzero()
+    labelling, page = image.labelling, image.page
+    assert page.request.post(f"{labelling.url}/reset").ok
+    wait_for_picture(labelling.frame)
+    expected = image.silhouette(np.array(labelling.state["T_camera_object"])).nonzero()
     wait_until(lambda: np.linalg.norm(image.place - np.mean(expected, axis=1)[::-1]) < 5, "the start pose")
     before = image.place
-    start, end = desk.take_hold("tz", 0.08)
+    start, end = labelling.take_hold("tz", 0.08)
     for share in (0.3, 0.6, 1.0):
         page.mouse.move(*(start + share * (end - start)))
     wait_until(lambda: np.linalg.norm(image.place - before) > 10, "the outline on its way")
-    assert desk.state["dragging"]
+    assert labelling.state["dragging"]
     take_picture(page, "label-outline-in-a-drag")
     page.mouse.up()
-    desk.events("drag")
+    labelling.events("drag")
     image.blend(1.0)
-    expected = image.silhouette(np.array(desk.state["T_camera_object"]))
+    expected = image.silhouette(np.array(labelling.state["T_camera_object"]))
     wait_until(lambda: image.overlap(expected) > 0.95, "the outline where the drag ended", 20)
 
 
@@ -242,15 +242,15 @@ def test_the_machine_and_the_human_have_their_colours(image: Image) -> None:
 
     assert is_warm()
     image.page.keyboard.press("Space")
-    image.desk.events("snap_applied")
+    image.labelling.events("snap_applied")
     wait_until(lambda: not is_warm(), "the outline in the colour of the machine")
     image.page.keyboard.press("z")
     take_picture(image.page, "label-outline-snapped")
 
 
 def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image) -> None:
-    page, desk = image.page, image.desk
-    T_world_object = np.array(desk.state["T_world_object"])
+    page, labelling = image.page, image.labelling
+    T_world_object = np.array(labelling.state["T_world_object"])
 
     def are_drawn() -> bool:
         thumbnails = image.drawn_on("#frame-list canvas")
@@ -272,7 +272,7 @@ def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image)
     first, _, third = image.frames
     current = page.locator("#frame-list [aria-current]")
     page.get_by_role("button", name=f"Show frame {third['image_id']}").click()
-    wait_until(lambda: desk.state["frame_id"] == third["id"], "the frame that was clicked")
+    wait_until(lambda: labelling.state["frame_id"] == third["id"], "the frame that was clicked")
     expect(current).to_have_accessible_name(f"Show frame {third['image_id']}")
     expect(page.locator("#frame-place")).to_have_text("3 of 3")
     expect(page.locator("#frame-next")).to_be_disabled()
@@ -281,8 +281,8 @@ def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image)
     expect(page.locator("#frame-place")).to_have_text("2 of 3")
     page.get_by_role("button", name="Previous frame").click()
     expect(page.locator("#frame-place")).to_have_text("1 of 3")
-    assert desk.state["frame_id"] == first["id"]
-    assert len(desk.events("frame", 3)) == 3
+    assert labelling.state["frame_id"] == first["id"]
+    assert len(labelling.events("frame", 3)) == 3
 
 
 def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser) -> None:
@@ -291,7 +291,7 @@ def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser
     try:
         page = context.new_page()
         page.goto(server.new_link("without webgl"))
-        Desk(page, server, "mug")
+        LabellingPage(page, server, "mug")
         expect(page.locator("#no-outline")).to_have_text("Without WebGL 2 no outline can be drawn.")
         expect(page.locator("#blend")).to_be_hidden()
         expect(page.locator("#color")).to_be_visible()
@@ -301,7 +301,7 @@ def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser
 
 
 def test_the_image_changes_places_with_the_view(image: Image) -> None:
-    page, frame = image.page, image.desk.frame
+    page, frame = image.page, image.labelling.frame
 
     def times_as_wide_as_the_view() -> float:
         image_box, view_box = (page.locator(part).bounding_box() for part in ("#image", "#view"))

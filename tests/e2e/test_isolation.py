@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server, descendants, serving
 
 pytestmark = pytest.mark.e2e
 
 
 def test_two_operators_do_not_reach_each_other(server: Server, open_page: Callable[[str], Page]) -> None:
-    ann = Desk(open_page(server.new_link("ann")), server)
-    bob = Desk(open_page(server.new_link("bob")), server)
+    ann = LabellingPage(open_page(server.new_link("ann")), server)
+    bob = LabellingPage(open_page(server.new_link("bob")), server)
     assert ann.url != bob.url
     assert ann.page.request.get(bob.url).status == 404
     assert ann.page.request.put(f"{bob.url}/pose", data={"T_world_object": []}).status in {404, 422}
@@ -39,8 +39,10 @@ def test_only_the_public_port_listens_beyond_loopback(
     tmp_path: Path, open_page: Callable[[str], Page]
 ) -> None:
     with serving(tmp_path / "state", "--prepare", "--host", "0.0.0.0") as running:
-        desk = Desk(open_page(running.sign_in_link), running)  # a view and its viser server are up
-        expect(desk.page.locator("#snap")).to_be_enabled()
+        labelling = LabellingPage(
+            open_page(running.sign_in_link), running
+        )  # a view and its viser server are up
+        expect(labelling.page.locator("#snap")).to_be_enabled()
         public = {port for address, port in listening(running.process.pid) if address != "127.0.0.1"}
         assert public == {int(running.url.rsplit(":", 1)[1])}
         assert len(listening(running.process.pid)) > 3  # scheduler, workers and the view, all on the loopback

@@ -6,7 +6,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -20,7 +20,7 @@ ANNOUNCED = 'nodes => nodes.map(node => node.getAttribute("aria-keyshortcuts"))'
 
 
 def test_every_key_is_in_the_help_and_its_own(server: Server, open_page: Callable[[str], Page]) -> None:
-    page = Desk(open_page(server.new_link("keys")), server).page
+    page = LabellingPage(open_page(server.new_link("keys")), server).page
     page.keyboard.press("?")
     rows = page.locator("#key-list [data-keys]")
     bound = rows.evaluate_all(BOUND)
@@ -41,8 +41,8 @@ def test_every_key_is_in_the_help_and_its_own(server: Server, open_page: Callabl
 
 
 def test_keys_work_wherever_the_focus_is(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("focus")), server)
-    page = desk.page
+    labelling = LabellingPage(open_page(server.new_link("focus")), server)
+    page = labelling.page
     outline = page.locator("#outline")
     field = page.get_by_label("Position x, millimetres")
     places = {

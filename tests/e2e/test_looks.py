@@ -1,21 +1,18 @@
 """How the labelling page looks: small and large, light and dark, without colour, and to a screen reader."""
 
-import re
 from collections.abc import Callable
 
 import pytest
 from playwright.sync_api import Page
 
 from tests.e2e.conftest import drawing_finely, take_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.page_rules import NAMELESS
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
 SIZES = [(1366, 768), (1920, 1080), (2560, 1440)]
-NAMELESS = re.compile(
-    r"^\s*- (button|link|textbox|searchbox|slider|meter|progressbar|combobox|checkbox)(:|$| \[)"
-)
 FITS = """() => {
   const root = document.documentElement, side = document.querySelector(".side");
   const around = side.getBoundingClientRect();
@@ -35,11 +32,11 @@ FITS = """() => {
 def test_it_fits_small_and_large_screens_and_names_everything(
     server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    desk = Desk(drawing_finely(open_page(server.new_link("looks"))), server)
-    page = desk.page
-    desk.drag("tx", 0.02)
+    labelling = LabellingPage(drawing_finely(open_page(server.new_link("looks"))), server)
+    page = labelling.page
+    labelling.drag("tx", 0.02)
     page.keyboard.press("Space")
-    desk.events("snap_applied")
+    labelling.events("snap_applied")
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
         for width, height in SIZES:
@@ -55,7 +52,7 @@ def test_it_fits_small_and_large_screens_and_names_everything(
 
 
 def test_a_panel_with_more_in_it_scrolls_in_itself(server: Server, open_page: Callable[[str], Page]) -> None:
-    page = Desk(open_page(server.new_link("more-rows")), server).page
+    page = LabellingPage(open_page(server.new_link("more-rows")), server).page
     more = "document.querySelector('.{}').append(...Array.from({{length: 6}}, () => " + (
         "Object.assign(document.createElement('p'), {{ textContent: 'One more row', className: 'panel' }})))"
     )

@@ -13,23 +13,15 @@ from app.storage.tables import CalibrationRow, Condition, Dataset
 from registration_core import ALGORITHM
 from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
-from tests.e2e.gizmo import pull, wait_for_picture
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_readme import true_pose
+from tests.e2e.demo_truth import true_pose
+from tests.e2e.gizmo import wait_for_picture
+from tests.e2e.labelling_page import GHOST_HIDDEN, GHOST_SHOWN, LabellingPage, hold
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
 OBJECT = "box"
 """Of which the machine is sure."""
-GHOST_AT = """() => {
-  const node = window.__viserMutable.nodeRefFromName["/ghost"];
-  if (!node) return null;
-  for (let above = node; above; above = above.parent) if (!above.visible) return null;
-  return node.position.toArray();
-}"""
-GHOST_SHOWN = f"() => ({GHOST_AT})() !== null"
-GHOST_HIDDEN = f"() => ({GHOST_AT})() === null"
 
 GIZMO_NEAR = """T => {
   const {x, y, z} = window.__viserMutable.nodeRefFromName["/object"].position;
@@ -37,7 +29,7 @@ GIZMO_NEAR = """T => {
 }"""
 """Whether the gizmo is where an object at this pose has it, whose origin is not far."""
 
-Open = Callable[[Condition], Desk]
+Open = Callable[[Condition], LabellingPage]
 
 
 @pytest.fixture(autouse=True)
@@ -62,46 +54,41 @@ def calibrated(server: Server) -> Iterator[None]:
 
 
 @pytest.fixture
-def open_desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Open:
+def open_labelling(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Open:
     """Opens a new task under a condition, with the object roughly where it belongs."""
 
-    def open_one(condition: Condition) -> Desk:
+    def open_one(condition: Condition) -> LabellingPage:
         name = request.node.name.replace("_", "-")[:60]
-        desk = Desk(open_page(server.new_link(name, "admin")), server, OBJECT, condition)
-        truth = true_pose(desk.task["object"]["obj_id"])
+        labelling = LabellingPage(open_page(server.new_link(name, "admin")), server, OBJECT, condition)
+        truth = true_pose(labelling.task["object"]["obj_id"])
         roughly = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
-        put = desk.page.request.put(f"{desk.url}/pose", data={"T_world_object": roughly.tolist()})
+        put = labelling.page.request.put(f"{labelling.url}/pose", data={"T_world_object": roughly.tolist()})
         assert put.ok
-        expect(desk.page.locator("#undo")).to_be_enabled()
-        wait_for_picture(desk.frame)
-        return desk
+        expect(labelling.page.locator("#undo")).to_be_enabled()
+        wait_for_picture(labelling.frame)
+        return labelling
 
     return open_one
 
 
-def kinds(desk: Desk) -> list[str]:
-    items = desk.page.request.get(f"{desk.url}/events?limit=500").json()["items"]
+def kinds(labelling: LabellingPage) -> list[str]:
+    items = labelling.page.request.get(f"{labelling.url}/events?limit=500").json()["items"]
     return [event["kind"] for event in items if event["kind"] != "view"]
 
 
-def hold(desk: Desk, handle: str, amount: float) -> None:
-    """Drag a handle with the mouse and keep hold of it."""
-    pull(desk.page, *desk.take_hold(handle, amount))
-
-
-def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) -> None:
-    desk = open_desk("auto")
-    page = desk.page
-    drag = desk.drag("tx", 0.01)
-    (applied,) = desk.events("snap_applied")
+def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_labelling: Open) -> None:
+    labelling = open_labelling("auto")
+    page = labelling.page
+    drag = labelling.drag("tx", 0.01)
+    (applied,) = labelling.events("snap_applied")
     assert applied["actor"] == "machine"
     assessment = applied["detail"]["assessment"]
     assert assessment["verdict"] == "accept"
     assert applied["detail"]["confidence"] == assessment["confidence"] >= assessment["threshold"]
-    (requested,) = desk.events("snap_requested")
+    (requested,) = labelling.events("snap_requested")
     assert requested["actor"] == "machine"
-    truth = true_pose(desk.task["object"]["obj_id"])
-    assert pose.distance(desk.pose, truth).translation < 0.003
+    truth = true_pose(labelling.task["object"]["obj_id"])
+    assert pose.distance(labelling.pose, truth).translation < 0.003
     said = f"The machine took over, confidence {applied['detail']['confidence']:.2f}."
     expect(page.locator("#note")).to_contain_text(said)
     expect(page.locator("#note-undo")).to_have_text("Undo Ctrl Z")
@@ -109,86 +96,86 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_desk: Open) ->
     expect(page.locator("#assessment")).to_contain_text("accept: at most 5 %")
     take_picture(page, "label-taken-over")
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.allclose(desk.pose, drag["T_after"])
+    labelling.events("undo")
+    assert np.allclose(labelling.pose, drag["T_after"])
     expect(page.locator("#note")).to_be_hidden()
 
 
-def test_what_was_taken_back_in_auto_is_only_suggested(open_desk: Open) -> None:
-    desk = open_desk("auto")
-    page = desk.page
-    desk.drag("tx", 0.01)
-    desk.events("snap_applied")
+def test_what_was_taken_back_in_auto_is_only_suggested(open_labelling: Open) -> None:
+    labelling = open_labelling("auto")
+    page = labelling.page
+    labelling.drag("tx", 0.01)
+    labelling.events("snap_applied")
     expect(page.locator("#note")).to_contain_text("took over")
-    wait_for_picture(desk.frame)
-    drag = desk.drag("ty", 0.01)
-    desk.events("snap_offered")
-    assert np.allclose(desk.pose, drag["T_after"])
+    wait_for_picture(labelling.frame)
+    drag = labelling.drag("ty", 0.01)
+    labelling.events("snap_offered")
+    assert np.allclose(labelling.pose, drag["T_after"])
     expect(page.locator("#note")).to_contain_text("The machine suggests the ghost")
     expect(page.locator("#offer")).to_be_hidden()
-    desk.frame.wait_for_function(GHOST_SHOWN)
+    labelling.frame.wait_for_function(GHOST_SHOWN)
     expect(page.locator("#note-assessment")).to_contain_text("accept")
     take_picture(page, "label-suggested")
     page.locator("#note-accept").click()
-    (accepted,) = desk.events("accept")
-    assert np.allclose(desk.pose, accepted["T_after"])
-    desk.frame.wait_for_function(GHOST_HIDDEN)
+    (accepted,) = labelling.events("accept")
+    assert np.allclose(labelling.pose, accepted["T_after"])
+    labelling.frame.wait_for_function(GHOST_HIDDEN)
 
 
-def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_desk: Open) -> None:
-    desk = open_desk("snap")
-    page = desk.page
+def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_labelling: Open) -> None:
+    labelling = open_labelling("snap")
+    page = labelling.page
     page.keyboard.press("v")
     expect(page.locator("#live")).to_have_attribute("aria-pressed", "true")
-    desk.frame.wait_for_function(GHOST_SHOWN)
-    hold(desk, "tx", 0.02)
-    assert desk.state["dragging"]
-    held = desk.pose
+    labelling.frame.wait_for_function(GHOST_SHOWN)
+    hold(labelling, "tx", 0.02)
+    assert labelling.state["dragging"]
+    held = labelling.pose
     expect(page.locator("#note")).to_contain_text("A snap would land at the ghost")
     take_picture(page, "label-live")
     page.mouse.up()
-    desk.events("drag")
+    labelling.events("drag")
     page.keyboard.press("y")
-    (accepted,) = desk.events("accept")
-    truth = true_pose(desk.task["object"]["obj_id"])
-    assert pose.distance(desk.pose, truth).translation < 0.003 < pose.distance(held, truth).translation
-    snap = page.request.get(f"{desk.root}/api/snaps/{accepted['snap_id']}").json()
+    (accepted,) = labelling.events("accept")
+    truth = true_pose(labelling.task["object"]["obj_id"])
+    assert pose.distance(labelling.pose, truth).translation < 0.003 < pose.distance(held, truth).translation
+    snap = page.request.get(f"{labelling.root}/api/snaps/{accepted['snap_id']}").json()
     assert snap["state"] == "done"
     assert np.allclose(snap["estimate"]["T_world_object"], accepted["T_after"])
-    desk.frame.wait_for_function(GHOST_HIDDEN)
-    assert "snap_requested" not in kinds(desk)
+    labelling.frame.wait_for_function(GHOST_HIDDEN)
+    assert "snap_requested" not in kinds(labelling)
     page.reload()
     expect(page.locator("#live")).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("v")
     expect(page.locator("#live")).to_have_attribute("aria-pressed", "false")
-    assert [event["detail"]["on"] for event in desk.events("live")] == [True, False]
+    assert [event["detail"]["on"] for event in labelling.events("live")] == [True, False]
 
 
-def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_desk: Open) -> None:
-    desk = open_desk("snap")
-    page = desk.page
+def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_labelling: Open) -> None:
+    labelling = open_labelling("snap")
+    page = labelling.page
     page.locator("#live").click()
-    hold(desk, "ty", 0.02)
+    hold(labelling, "ty", 0.02)
     expect(page.locator("#note")).to_contain_text("A snap would land at the ghost")
     page.keyboard.press("y")
-    (accepted,) = desk.events("accept")
+    (accepted,) = labelling.events("accept")
     page.mouse.move(600, 300)
     page.mouse.up()
-    desk.frame.wait_for_function(GIZMO_NEAR, arg=accepted["T_after"])
-    assert np.allclose(desk.pose, accepted["T_after"])
-    assert kinds(desk)[-2:] == ["drag", "accept"]
+    labelling.frame.wait_for_function(GIZMO_NEAR, arg=accepted["T_after"])
+    assert np.allclose(labelling.pose, accepted["T_after"])
+    assert kinds(labelling)[-2:] == ["drag", "accept"]
 
 
-def test_manual_shows_no_machine(open_desk: Open) -> None:
-    desk = open_desk("manual")
-    page = desk.page
+def test_manual_shows_no_machine(open_labelling: Open) -> None:
+    labelling = open_labelling("manual")
+    page = labelling.page
     for hidden in ("#snap", "#cancel", "#live", "#confidence", "#note", "#offer"):
         expect(page.locator(hidden)).to_be_hidden()
     page.keyboard.press("Space")
     page.keyboard.press("v")
-    desk.drag("tx", 0.01)
-    assert not {"snap_requested", "live"} & set(kinds(desk))
-    refused = page.request.post(f"{desk.url}/snaps", data={})
+    labelling.drag("tx", 0.01)
+    assert not {"snap_requested", "live"} & set(kinds(labelling))
+    refused = page.request.post(f"{labelling.url}/snaps", data={})
     assert refused.status == 409 and "done by hand alone" in refused.json()["detail"]
     take_picture(page, "label-manual")
     page.keyboard.press("?")
@@ -196,14 +183,14 @@ def test_manual_shows_no_machine(open_desk: Open) -> None:
     expect(page.get_by_text("Snap", exact=True)).to_be_hidden()
 
 
-def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
-    desk = open_desk("snap")
-    page = desk.page
-    risk = f"{desk.root}/api/datasets/{desk.task['dataset']['id']}/risk"
+def test_a_pose_to_look_at_says_why_in_words(open_labelling: Open) -> None:
+    labelling = open_labelling("snap")
+    page = labelling.page
+    risk = f"{labelling.root}/api/datasets/{labelling.task['dataset']['id']}/risk"
     assert page.request.put(risk, data={"risk": 0.0001}).ok  # which 200 registrations cannot bear out
     page.keyboard.press("Space")
-    desk.events("snap_applied")
-    assessment = desk.state["assessment"]
+    labelling.events("snap_applied")
+    assessment = labelling.state["assessment"]
     assert page.request.put(risk, data={"risk": None}).ok
     assert assessment["verdict"] == "look"
     assert assessment["reasons"] == ["no confidence is known from which on at most 0.01 % are wrong"]
@@ -211,8 +198,8 @@ def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
     expect(shown).to_have_text(f"{assessment['verdict']}: {'; '.join(assessment['reasons'])}")
     expect(shown.locator(".icon")).to_be_visible()
     take_picture(page, "label-look")
-    page.request.post(f"{desk.url}/submit")
-    page.goto(f"{desk.root}/replay/{desk.state['id']}")
+    page.request.post(f"{labelling.url}/submit")
+    page.goto(f"{labelling.root}/replay/{labelling.state['id']}")
     applied = page.locator("#events button").filter(has_text="Snap applied")
     expect(applied).to_contain_text(assessment["verdict"])
     applied.click()
@@ -221,9 +208,9 @@ def test_a_pose_to_look_at_says_why_in_words(open_desk: Open) -> None:
         f"posed by the machine, {assessment['confidence']:.2f}, look"
     )
     take_picture(page, "replay-look")
-    page.goto(f"{desk.root}/?state=submitted")
+    page.goto(f"{labelling.root}/?state=submitted")
     expect(page.locator("#datasets")).to_contain_text("calibrated from 200 registrations")
-    verdict = page.locator(f"li:has([data-task-id='{desk.task['id']}']) .card-links .assessment")
+    verdict = page.locator(f"li:has([data-task-id='{labelling.task['id']}']) .card-links .assessment")
     expect(verdict).to_have_text("the machine’s last estimate: look")
     expect(verdict).to_have_attribute("title", f"look: {'; '.join(assessment['reasons'])}")
     verdict.scroll_into_view_if_needed()

@@ -6,18 +6,18 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_machine import Open, open_desk
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.test_machine import Open, open_labelling
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-__all__ = ["open_desk"]
+__all__ = ["open_labelling"]
 
 
-def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_desk: Open) -> None:
-    desk = open_desk("snap")
-    page = desk.page
+def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_labelling: Open) -> None:
+    labelling = open_labelling("snap")
+    page = labelling.page
     method, status = page.locator("#method"), page.locator("#snap-status")
     expect(method).to_have_value("default")
     take_picture(page, "method-choice")
@@ -25,19 +25,19 @@ def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_desk: Open) -
     expect(status).to_contain_text("by the paper’s filter now")
     page.keyboard.press("Space")
     expect(status).to_have_text("The paper’s filter runs…")
-    desk.wait_for_progress()
+    labelling.wait_for_progress()
     page.keyboard.press("Escape")
     expect(status).to_contain_text("cancelled")
     page.keyboard.press("Space")
     expect(status).to_contain_text("Snapped by the paper’s filter, confidence", timeout=90_000)
     take_picture(page, "method-paper")
-    assert [e["detail"]["config"]["method"] for e in desk.events("snap_requested", 2)] == [
+    assert [e["detail"]["config"]["method"] for e in labelling.events("snap_requested", 2)] == [
         "particle_filter"
     ] * 2
 
     page.reload()
     expect(method).to_have_value("paper")
-    desk.submit()  # the paper's filter may end anywhere
+    labelling.submit()  # the paper's filter may end anywhere
     page.locator("#replay").click()
     applied = page.locator("#events li").filter(has_text="Snap applied")
     expect(applied).to_contain_text("paper’s filter")
@@ -48,11 +48,13 @@ def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_desk: Open) -
 def test_where_the_condition_fixes_the_method_there_is_no_choice(
     server: Server, open_page: Callable[[str], Page], condition: str
 ) -> None:
-    desk = Desk(open_page(server.new_link(f"fixed {condition}", "admin")), server, "box", condition)
-    expect(desk.page.locator("#undo")).to_be_visible()
-    expect(desk.page.locator("#method")).to_be_hidden()
+    labelling = LabellingPage(
+        open_page(server.new_link(f"fixed {condition}", "admin")), server, "box", condition
+    )
+    expect(labelling.page.locator("#undo")).to_be_visible()
+    expect(labelling.page.locator("#method")).to_be_hidden()
     if condition == "paper snap":
-        take_picture(desk.page, "method-fixed")
+        take_picture(labelling.page, "method-fixed")
 
 
 def test_a_lead_sets_the_method_of_new_tasks(server: Server, open_page: Callable[[str], Page]) -> None:

@@ -16,7 +16,7 @@ from registration_core.geometry import pose
 from tests.app.small_dataset import BLOCK, NAME, true_pose, write_small_dataset
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_looks import NAMELESS
+from tests.e2e.page_rules import NAMELESS
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e

@@ -11,7 +11,7 @@ from app.config import PROJECT
 from registration_core.bop.dataset import read_dataset
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame, wait_for_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -28,45 +28,45 @@ def true_poses() -> dict[str, np.ndarray]:
     return {names[t.obj_id]: image.T_world_camera @ t.T_camera_object for t in image.ground_truth or ()}
 
 
-def finish_another(desk: Desk, name: str, T_world_object: np.ndarray) -> tuple[int, str]:
+def finish_another(labelling: LabellingPage, name: str, T_world_object: np.ndarray) -> tuple[int, str]:
     """Submit another object of the scene as the same operator: (task, the registration's address)."""
-    request = desk.page.request
-    tasks = request.get(f"{desk.root}/api/tasks?scene_id=1").json()["items"]
+    request = labelling.page.request
+    tasks = request.get(f"{labelling.root}/api/tasks?scene_id=1").json()["items"]
     task_id = next(task["id"] for task in tasks if task["object"]["name"] == name)
-    started = request.post(f"{desk.root}/api/tasks/{task_id}/registration").json()
-    url = f"{desk.root}/api/registrations/{started['id']}"
+    started = request.post(f"{labelling.root}/api/tasks/{task_id}/registration").json()
+    url = f"{labelling.root}/api/registrations/{started['id']}"
     assert request.put(f"{url}/pose", data={"T_world_object": T_world_object.tolist()}).ok
     assert request.post(f"{url}/submit").ok
     return task_id, url
 
 
 def test_what_is_done_is_shown_listed_and_hidden(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("several")), server, "mug")
-    page, poses = desk.page, true_poses()
-    others = [name for name in poses if name != desk.task["object"]["name"]][:3]
-    finished = [finish_another(desk, name, poses[name]) for name in others]
+    labelling = LabellingPage(open_page(server.new_link("several")), server, "mug")
+    page, poses = labelling.page, true_poses()
+    others = [name for name in poses if name != labelling.task["object"]["name"]][:3]
+    finished = [finish_another(labelling, name, poses[name]) for name in others]
     task_id = finished[0][0]
-    page.request.post(f"{desk.url}/skip", data={"reason": "ambiguous"})  # draws the page anew
-    page.request.post(f"{desk.url}/reopen")
+    page.request.post(f"{labelling.url}/skip", data={"reason": "ambiguous"})  # draws the page anew
+    page.request.post(f"{labelling.url}/reopen")
     expect(page.locator("#things-done")).to_contain_text(re.compile("[3-9] of . others done"), timeout=30_000)
     page.locator("#things summary").click()
     entry = page.locator(f"#things-list a[href='/label/{task_id}']")
     expect(entry).to_contain_text("done")
     node = f"/neighbours/{task_id}"
-    desk.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
+    labelling.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        wait_for_picture(desk.frame)
+        wait_for_picture(labelling.frame)
         take_picture(page, f"label-objects-{scheme}")
     page.keyboard.press("Shift+B")
-    desk.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)
+    labelling.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)
     expect(page.locator("#hide-things")).to_contain_text("Show done")
     page.reload()
-    desk.frame = view_frame(page)
+    labelling.frame = view_frame(page)
     expect(page.locator("#hide-things")).to_contain_text("Show done", timeout=30_000)
-    desk.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)
+    labelling.frame.wait_for_function(HAS_NODE, arg=[node, False], timeout=30_000)
     page.locator("#hide-things").click()
-    desk.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
+    labelling.frame.wait_for_function(HAS_NODE, arg=[node, True], timeout=30_000)
     entry.click()
     page.wait_for_url(f"**/label/{task_id}")
     expect(page.locator("#crumb-object")).to_contain_text(others[0], timeout=30_000)
@@ -75,29 +75,29 @@ def test_what_is_done_is_shown_listed_and_hidden(server: Server, open_page: Call
 
 
 def test_skip_with_a_reason_reopen_submit_and_go_on(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("skipper")), server, "mug")
-    page = desk.page
+    labelling = LabellingPage(open_page(server.new_link("skipper")), server, "mug")
+    page = labelling.page
     expect(page.locator("#skip")).to_be_enabled(timeout=30_000)
     page.keyboard.press("Shift+Enter")
     expect(page.locator("#skip-dialog")).to_be_visible()
     take_picture(page, "label-skip")
     page.keyboard.press("4")
-    (skipped,) = desk.events("skip")
+    (skipped,) = labelling.events("skip")
     assert skipped["detail"] == {"reason": "ambiguous"}
     expect(page.locator("#submitted")).to_contain_text("Skipped: ambiguous.")
     expect(page.locator("#next-name")).to_contain_text("Next:")
     page.locator("#reopen").click()
-    desk.events("reopen")
+    labelling.events("reopen")
     expect(page.locator("#submit")).to_be_enabled()
-    desk.drag("tx", 0.02)
-    desk.submit_unsure()
+    labelling.drag("tx", 0.02)
+    labelling.submit_unsure()
     expect(page.locator("#submitted")).to_contain_text("Submitted.")
     page.keyboard.press("Enter")
-    page.wait_for_url(lambda url: "/label/" in url and url != desk.page_url)
-    page.request.post(f"{desk.url}/reopen")
-    page.request.post(f"{desk.url}/skip", data={"reason": "no depth"})
+    page.wait_for_url(lambda url: "/label/" in url and url != labelling.page_url)
+    page.request.post(f"{labelling.url}/reopen")
+    page.request.post(f"{labelling.url}/skip", data={"reason": "no depth"})
     page.goto(server.url)
-    card = page.locator(f"[data-task-id='{desk.task['id']}']")
+    card = page.locator(f"[data-task-id='{labelling.task['id']}']")
     expect(card).to_contain_text("you (no depth)")
     card.scroll_into_view_if_needed()
     take_picture(page, "home-skipped")

@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_trial import participant_link
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.participants import participant_link
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -15,22 +15,22 @@ pytestmark = pytest.mark.e2e
 
 def test_operators_see_who_else_has_their_task_open(server: Server, open_page: Callable[[str], Page]) -> None:
     ada, ben = (open_page(server.new_link(name)) for name in ("Ada beside Ben", "Ben beside Ada"))
-    desk = Desk(ada, server, "mug")
+    labelling = LabellingPage(ada, server, "mug")
     expect(ada.locator("#others")).to_be_empty()
 
     home = open_page(server.new_link("somebody at home"))
-    card = home.locator(f"[data-task-id='{desk.task['id']}'] .card-state")
+    card = home.locator(f"[data-task-id='{labelling.task['id']}'] .card-state")
     expect(card).to_contain_text("Ada beside Ben (open now)")
     take_picture(home, "home-open-now")
 
-    Desk(ben, server, "mug")
+    LabellingPage(ben, server, "mug")
     expect(ben.locator("#others")).to_have_text("Ada beside Ben is working on this task, too")
     expect(ada.locator("#others")).to_have_text("Ben beside Ada is working on this task, too")
     for scheme in ("light", "dark"):
         ada.emulate_media(color_scheme=scheme)
         take_picture(ada, f"label-others-{scheme}")
     third = open_page(server.new_link("x-" * 45))
-    Desk(third, server, "mug")
+    LabellingPage(third, server, "mug")
     expect(third.locator("#others")).to_have_text(
         "Ada beside Ben and Ben beside Ada are working on this task, too"
     )
@@ -41,7 +41,7 @@ def test_operators_see_who_else_has_their_task_open(server: Server, open_page: C
     expect(ada.locator("#others")).to_have_text("Ben beside Ada is working on this task, too")
     ben.goto(server.url)
     expect(ada.locator("#others")).to_be_empty()
-    expect(ben.locator(f"[data-task-id='{desk.task['id']}']")).to_contain_text(
+    expect(ben.locator(f"[data-task-id='{labelling.task['id']}']")).to_contain_text(
         "Ada beside Ben (open now), you"
     )
 

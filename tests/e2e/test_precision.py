@@ -14,7 +14,7 @@ from registration_core.geometry import pose
 from tests.conftest import REPOSITORY
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import pixel, wait_for_camera, wait_for_picture
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -38,7 +38,7 @@ COVERED = """() => [...document.querySelectorAll(".stage button, .strip > button
 """Controls over and below the view that something else lies on."""
 
 
-class PreciseDesk(Desk):
+class PreciseLabellingPage(LabellingPage):
     """A labelling page, with what is needed to say where things are."""
 
     @property
@@ -95,21 +95,25 @@ class PreciseDesk(Desk):
         return self.camera
 
 
-def true_pose(desk: PreciseDesk) -> np.ndarray:
+def true_pose(labelling: PreciseLabellingPage) -> np.ndarray:
     """Where the bottle really is: T_world_object (4, 4)."""
-    entries = json.loads((DEMO / "test/000001/scene_gt.json").read_text())[str(desk.frame_info["image_id"])]
+    entries = json.loads((DEMO / "test/000001/scene_gt.json").read_text())[
+        str(labelling.frame_info["image_id"])
+    ]
     truth = next(entry for entry in entries if entry["obj_id"] == BOTTLE)
     T_camera_object = pose.from_rotation_translation(
         np.reshape(truth["cam_R_m2c"], (3, 3)), np.array(truth["cam_t_m2c"]) / 1000
     )
-    return desk.T_world_camera @ T_camera_object
+    return labelling.T_world_camera @ T_camera_object
 
 
 @pytest.fixture
-def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> PreciseDesk:
+def labelling(
+    server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest
+) -> PreciseLabellingPage:
     """A new operator before the bottle of the first scene."""
     name = re.sub(r"\W", "-", request.node.name)[:60]
-    return PreciseDesk(open_page(server.new_link(name)), server, "bottle")
+    return PreciseLabellingPage(open_page(server.new_link(name)), server, "bottle")
 
 
 def motion(event: dict) -> tuple[np.ndarray, np.ndarray]:
@@ -118,28 +122,28 @@ def motion(event: dict) -> tuple[np.ndarray, np.ndarray]:
     return after[:3, 3] - before[:3, 3], after[:3, :3] @ before[:3, :3].T
 
 
-def test_keys_nudge_in_three_steps_and_three_frames(desk: PreciseDesk) -> None:
-    page = desk.page
+def test_keys_nudge_in_three_steps_and_three_frames(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
     page.locator("#precision summary").click()
-    T = desk.pose
-    right = desk.T_world_camera[:3, 0]  # the first view is the sensor's
+    T = labelling.pose
+    right = labelling.T_world_camera[:3, 0]  # the first view is the sensor's
     for key, step in (("1", 0.0005), ("3", 0.01), ("2", 0.002)):
         page.keyboard.press(key)
-        event = desk.press("l")
+        event = labelling.press("l")
         assert event["detail"] == {"technique": "nudge"}
         assert motion(event)[0] == pytest.approx(step * right, abs=1e-5)
     expect(page.locator("[data-step='1']")).to_have_attribute("aria-pressed", "true")
     page.keyboard.press("x")
     expect(page.locator("[data-axes='object']")).to_have_attribute("aria-pressed", "true")
-    assert motion(desk.press("i"))[0] == pytest.approx(0.002 * T[:3, 1], abs=1e-9)
+    assert motion(labelling.press("i"))[0] == pytest.approx(0.002 * T[:3, 1], abs=1e-9)
     page.locator("[data-axes='world']").click()
-    assert motion(desk.press("u"))[0] == pytest.approx([0, 0, -0.002], abs=1e-9)
-    turned = desk.press("Shift+o")
+    assert motion(labelling.press("u"))[0] == pytest.approx([0, 0, -0.002], abs=1e-9)
+    turned = labelling.press("Shift+o")
     assert motion(turned)[1] == pytest.approx(pose.exp([0, 0, 0, 0, 0, np.radians(2)])[:3, :3])
-    assert np.allclose(desk.press("Shift+u")["T_after"], turned["T_before"])
+    assert np.allclose(labelling.press("Shift+u")["T_after"], turned["T_before"])
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.allclose(desk.pose, turned["T_after"])
+    labelling.events("undo")
+    assert np.allclose(labelling.pose, turned["T_after"])
     take_picture(page, "label-precision")
     page.emulate_media(color_scheme="dark")
     take_picture(page, "label-precision-dark")
@@ -148,55 +152,57 @@ def test_keys_nudge_in_three_steps_and_three_frames(desk: PreciseDesk) -> None:
     expect(page.locator("[data-axes='world']")).to_have_attribute("aria-pressed", "true")
 
 
-def test_a_key_held_down_goes_on_and_overtakes_nothing(desk: PreciseDesk) -> None:
-    page = desk.page
-    T = desk.pose
+def test_a_key_held_down_goes_on_and_overtakes_nothing(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    T = labelling.pose
     page.keyboard.press("x")
     for _ in range(12):  # as the keyboard repeats it
         page.keyboard.down("o")
     page.keyboard.up("o")
     wanted = T @ pose.exp([0, 0, 12 * 0.002, 0, 0, 0])
     deadline = time.monotonic() + 30
-    while not np.allclose(desk.pose, wanted, atol=1e-9):  # several presses may come as one event
-        assert time.monotonic() < deadline, desk.pose
+    while not np.allclose(labelling.pose, wanted, atol=1e-9):  # several presses may come as one event
+        assert time.monotonic() < deadline, labelling.pose
         page.wait_for_timeout(50)
 
 
-def test_quarter_turns_and_flips_keep_the_middle(desk: PreciseDesk) -> None:
-    page = desk.page
-    T = desk.pose
+def test_quarter_turns_and_flips_keep_the_middle(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    T = labelling.pose
     page.keyboard.press("x")
     for _ in range(4):
-        event = desk.press("Alt+l")
+        event = labelling.press("Alt+l")
         assert (event["detail"]["technique"], event["dof"]) == ("turn", ["rx"])
-    assert desk.pose == pytest.approx(T, abs=1e-9)
+    assert labelling.pose == pytest.approx(T, abs=1e-9)
     for _ in range(2):
-        assert desk.press("Alt+Shift+O")["detail"]["technique"] == "flip"
-    assert desk.pose == pytest.approx(T, abs=1e-9)
+        assert labelling.press("Alt+Shift+O")["detail"]["technique"] == "flip"
+    assert labelling.pose == pytest.approx(T, abs=1e-9)
     page.locator("#precision summary").click()
-    by_button = desk.change(lambda: page.get_by_role("button", name="Turn by 90 degrees about z").click())
+    by_button = labelling.change(
+        lambda: page.get_by_role("button", name="Turn by 90 degrees about z").click()
+    )
     assert by_button["dof"] == ["rz"]
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    flipped = desk.change(lambda: page.get_by_role("button", name="Flip about y").click())
+    labelling.events("undo")
+    flipped = labelling.change(lambda: page.get_by_role("button", name="Flip about y").click())
     assert (flipped["dof"], flipped["detail"]["technique"]) == (["ry"], "flip")
 
 
-def test_numbers_can_be_typed(desk: PreciseDesk) -> None:
-    page = desk.page
+def test_numbers_can_be_typed(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
     field = page.locator("[data-pose=x]")
     expect(field).not_to_have_value("")
-    before = np.linalg.inv(desk.T_world_camera) @ desk.pose
+    before = np.linalg.inv(labelling.T_world_camera) @ labelling.pose
     field.click()
     page.keyboard.type("77,5")
     page.keyboard.press("Escape")
     expect(field).to_have_value(f"{1000 * before[0, 3]:.1f}")
-    assert desk.moves() == 0
+    assert labelling.moves() == 0
     field.click()
     page.keyboard.type("12.5")
-    event = desk.press("Enter")
+    event = labelling.press("Enter")
     assert event["detail"] == {"technique": "numbers"}
-    after = np.linalg.inv(desk.T_world_camera) @ desk.pose
+    after = np.linalg.inv(labelling.T_world_camera) @ labelling.pose
     assert after[:3, 3] == pytest.approx([0.0125, before[1, 3], before[2, 3]], abs=1e-9)
     assert after[:3, :3] == pytest.approx(before[:3, :3])
     expect(field).to_have_value("12.5")
@@ -204,8 +210,8 @@ def test_numbers_can_be_typed(desk: PreciseDesk) -> None:
     vector = pose.log(after)[3:]
     page.locator("[data-pose=ry]").click()
     page.keyboard.type("-30")
-    desk.press("Enter")
-    turned = pose.log(np.linalg.inv(desk.T_world_camera) @ desk.pose)
+    labelling.press("Enter")
+    turned = pose.log(np.linalg.inv(labelling.T_world_camera) @ labelling.pose)
     assert turned[:3] == pytest.approx(after[:3, 3])
     expected = pose.exp([0, 0, 0, vector[0], np.radians(-30), vector[2]])
     assert pose.exp(turned)[:3, :3] == pytest.approx(expected[:3, :3])
@@ -213,41 +219,41 @@ def test_numbers_can_be_typed(desk: PreciseDesk) -> None:
     page.keyboard.type("near")
     page.keyboard.press("Enter")
     expect(page.locator("#message")).to_contain_text("no number")
-    assert desk.moves() == 2
-    assert desk.state["state"] == "open"  # Enter in a field submits nothing
+    assert labelling.moves() == 2
+    assert labelling.state["state"] == "open"  # Enter in a field submits nothing
 
 
-def test_the_gizmo_in_the_worlds_axes_drags_along_them(desk: PreciseDesk) -> None:
-    page = desk.page
-    T = desk.press("Shift+i")["T_after"]  # so that no axis of the object is one of the world
+def test_the_gizmo_in_the_worlds_axes_drags_along_them(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    T = labelling.press("Shift+i")["T_after"]  # so that no axis of the object is one of the world
     page.keyboard.press("g")
     expect(page.locator("[data-gizmo=world]")).to_have_attribute("aria-pressed", "true")
-    desk.frame.wait_for_function(
+    labelling.frame.wait_for_function(
         "() => Math.abs(window.__viserMutable.nodeRefFromName['/object'].quaternion.w) > 0.9999"
     )
-    wait_for_picture(desk.frame)
+    wait_for_picture(labelling.frame)
     for handle, amount, expected in (("tz", 0.03, {"tz"}), ("rz", 0.3, {"rz"}), ("tx", 0.03, {"tx"})):
-        event = desk.drag(handle, amount)
+        event = labelling.drag(handle, amount)
         assert (set(event["dof"]), event["detail"]["axes"]) == (expected, "world")
-        desk.frame.wait_for_function(
+        labelling.frame.wait_for_function(
             "() => Math.abs(window.__viserMutable.nodeRefFromName['/object'].quaternion.w) > 0.9999"
         )
-    assert desk.pose[:3, 2] == pytest.approx(np.array(T)[:3, 2], abs=0.35)
+    assert labelling.pose[:3, 2] == pytest.approx(np.array(T)[:3, 2], abs=0.35)
     take_picture(page, "label-gizmo-world")
 
 
-def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None:
-    page = desk.page
+def test_views_from_all_sides_and_none_while_dragging(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
     page.keyboard.press("Shift+P")
-    desk.events("set_pose")
-    T = desk.pose
+    labelling.events("set_pose")
+    T = labelling.pose
     seen = {}
-    before = desk.camera
+    before = labelling.camera
     for key, name in (("6", "top"), ("7", "front"), ("8", "side"), ("9", "left"), ("4", "object")):
         page.keyboard.press(key)
-        seen[name] = before = desk.wait_for_camera(before)
+        seen[name] = before = labelling.wait_for_camera(before)
         take_picture(page, f"label-view-{name}")
-        middle = pixel(page, desk.frame, np.zeros(3)) - pixel_of_middle(page)
+        middle = pixel(page, labelling.frame, np.zeros(3)) - pixel_of_middle(page)
         assert np.abs(middle).max() < 5, name
     assert np.degrees(pose.rotation_angle(seen["top"][:3, :3].T @ seen["front"][:3, :3])) == pytest.approx(
         89, abs=1
@@ -256,19 +262,19 @@ def test_views_from_all_sides_and_none_while_dragging(desk: PreciseDesk) -> None
         30, abs=0.5
     )
     page.locator("[data-look=sensor]").click()
-    desk.wait_for_camera(before)
-    assert np.array_equal(desk.pose, T)
-    start, _ = desk.take_hold("tx", 0.0)
+    labelling.wait_for_camera(before)
+    assert np.array_equal(labelling.pose, T)
+    start, _ = labelling.take_hold("tx", 0.0)
     page.mouse.move(*(start + 4))
     page.mouse.move(*(start + 8))
     expect(page.locator("[data-look=top]")).to_be_disabled()
-    still = desk.camera
+    still = labelling.camera
     page.keyboard.press("6")
     page.mouse.move(*(start + 12))
     page.mouse.up()
-    desk.events("drag")
-    wait_for_picture(desk.frame)
-    assert np.array_equal(desk.camera, still)
+    labelling.events("drag")
+    wait_for_picture(labelling.frame)
+    assert np.array_equal(labelling.camera, still)
 
 
 def near(T: np.ndarray) -> object:
@@ -282,32 +288,34 @@ def pixel_of_middle(page: Page) -> np.ndarray:
     return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
 
 
-def test_a_click_in_the_image_places_the_object(desk: PreciseDesk) -> None:
-    page = desk.page
-    truth = pose.apply(true_pose(desk), MODEL.centre)
-    T = desk.pose
+def test_a_click_in_the_image_places_the_object(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    truth = pose.apply(true_pose(labelling), MODEL.centre)
+    T = labelling.pose
     page.keyboard.press("p")
     expect(page.locator("#place-mode")).to_be_visible()
     take_picture(page, "label-place")
     page.keyboard.press("Escape")
     expect(page.locator("#place-mode")).to_be_hidden()
     page.locator("#place").click()
-    at = desk.image_place(truth)
-    event = desk.change(lambda: page.mouse.click(*at))
+    at = labelling.image_place(truth)
+    event = labelling.change(lambda: page.mouse.click(*at))
     assert event["detail"] == {"technique": "place"}
-    placed = desk.pose
+    placed = labelling.pose
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.array(desk.change(lambda: page.mouse.dblclick(*at))["T_after"]) == near(placed)
+    labelling.events("undo")
+    assert np.array(labelling.change(lambda: page.mouse.dblclick(*at))["T_after"]) == near(placed)
     expect(page.locator("#place-mode")).to_be_hidden()
-    assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
-    assert np.linalg.norm(pose.apply(desk.pose, MODEL.centre) - truth) < 0.05
+    assert labelling.pose[:3, :3] == pytest.approx(T[:3, :3])
+    assert np.linalg.norm(pose.apply(labelling.pose, MODEL.centre) - truth) < 0.05
     take_picture(page, "label-placed")
 
 
-def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: PreciseDesk) -> None:
-    page = desk.page
-    T = desk.pose
+def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(
+    labelling: PreciseLabellingPage,
+) -> None:
+    page = labelling.page
+    T = labelling.pose
     page.keyboard.press("p")
     stage = page.locator("#view").bounding_box()
     assert stage is not None
@@ -315,23 +323,25 @@ def test_a_click_on_the_cloud_places_the_object_and_elsewhere_is_said(desk: Prec
     expect(page.locator("#message")).to_contain_text("no point of the cloud")
     expect(page.locator("#place-mode")).to_be_visible()
     where = np.array([stage["x"] + 0.42 * stage["width"], stage["y"] + 0.55 * stage["height"]])
-    event = desk.change(lambda: page.mouse.click(*where))
+    event = labelling.change(lambda: page.mouse.click(*where))
     assert event["detail"] == {"technique": "place"}
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.array(desk.change(lambda: page.mouse.dblclick(*where))["T_after"]) == near(event["T_after"])
-    assert desk.pose[:3, :3] == pytest.approx(T[:3, :3])
+    labelling.events("undo")
+    assert np.array(labelling.change(lambda: page.mouse.dblclick(*where))["T_after"]) == near(
+        event["T_after"]
+    )
+    assert labelling.pose[:3, :3] == pytest.approx(T[:3, :3])
     expect(page.locator("#place-mode")).to_be_hidden()
-    desk.wait_until_shown()
-    wait_for_picture(desk.frame)
-    assert np.abs(pixel(page, desk.frame, np.zeros(3)) - where).max() < 60
+    labelling.wait_until_shown()
+    wait_for_picture(labelling.frame)
+    assert np.abs(pixel(page, labelling.frame, np.zeros(3)) - where).max() < 60
     page.keyboard.press("?")
     take_picture(page, "label-keys-precision")
 
 
-def test_the_settings_cover_no_control(desk: PreciseDesk) -> None:
-    desk.page.locator("#precision summary").click()
-    desk.page.keyboard.press("f")  # with candidates, which lie over the view as well
-    expect(desk.page.locator("#candidates")).to_be_visible(timeout=60_000)
-    take_picture(desk.page, "label-precision-open")
-    assert desk.page.evaluate(COVERED) == []
+def test_the_settings_cover_no_control(labelling: PreciseLabellingPage) -> None:
+    labelling.page.locator("#precision summary").click()
+    labelling.page.keyboard.press("f")  # with candidates, which lie over the view as well
+    expect(labelling.page.locator("#candidates")).to_be_visible(timeout=60_000)
+    take_picture(labelling.page, "label-precision-open")
+    assert labelling.page.evaluate(COVERED) == []

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import place_of_object, view_frame, wait_for_object
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -18,21 +18,21 @@ PATIENCE = 60_000
 
 
 @pytest.fixture
-def desk(server: Server, open_page: Callable[[str], Page]) -> Desk:
+def labelling(server: Server, open_page: Callable[[str], Page]) -> LabellingPage:
     """A registration that was dragged, looked at from the top, snapped, undone and submitted."""
-    desk = Desk(open_page(server.new_link("operator of the replay")), server, "mug")
-    page = desk.page
-    desk.drag("tx", 0.04)
-    views = len(desk.events("view"))
+    labelling = LabellingPage(open_page(server.new_link("operator of the replay")), server, "mug")
+    page = labelling.page
+    labelling.drag("tx", 0.04)
+    views = len(labelling.events("view"))
     page.keyboard.press("6")
-    desk.events("view", views + 1)
+    labelling.events("view", views + 1)
     page.keyboard.press("Space")
-    desk.events("snap_applied")
+    labelling.events("snap_applied")
     page.keyboard.press("Control+z")
-    desk.events("undo")
+    labelling.events("undo")
     expect(page.locator("#submit")).to_be_enabled()  # the page has heard that the snap has ended
-    desk.submit_unsure()
-    return desk
+    labelling.submit_unsure()
+    return labelling
 
 
 def go_to(page: Page, share: float) -> float:
@@ -44,15 +44,15 @@ def go_to(page: Page, share: float) -> float:
 
 
 def test_a_registration_is_played_back_from_its_log(
-    desk: Desk, server: Server, open_page: Callable[[str], Page]
+    labelling: LabellingPage, server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    page = desk.page
+    page = labelling.page
     page.locator("#replay").click()
     page.wait_for_url("**/replay/*")
     frame = view_frame(page)
     start = place_of_object(frame)
-    trace = page.request.get(f"{desk.url}/trace").json()
-    (drag,) = desk.events("drag")
+    trace = page.request.get(f"{labelling.url}/trace").json()
+    (drag,) = labelling.events("drag")
     (span,) = (event for event in trace["events"] if event["kind"] == "drag")
 
     seconds = go_to(page, (span["start"] + span["end"]) / 2 / trace["seconds"])
@@ -71,7 +71,7 @@ def test_a_registration_is_played_back_from_its_log(
     page.keyboard.press(".")
     expect(page.locator("#events [aria-current]")).to_contain_text("Submitted", timeout=PATIENCE)
     expect(page.locator("#distance")).to_have_text("0.0 mm · 0.0° to the end", timeout=PATIENCE)
-    (submitted,) = desk.events("submit")
+    (submitted,) = labelling.events("submit")
     submitted_origin = np.array(submitted["T_after"])[:3, 3]
     wait_for_object(frame, start + submitted_origin - np.array(drag["T_before"])[:3, 3])
 

@@ -11,13 +11,12 @@ from app.storage.database import Database
 from tests.app.analysis.hand_made import Entry, at, moved, view
 from tests.app.analysis.hand_made_study import HandMadeStudy, ordinary_work, snapped
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_set_up import BROKEN_WORDS
+from tests.e2e.page_rules import BROKEN_WORDS
+from tests.e2e.study_logs import log_of
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-NEARER = (0.07, 0.045, 0.03, 0.02, 0.012, 0.006)
-"""Metres from the world's origin that each move comes to; the turn shrinks along."""
 
 PANELS = """() => {
   const root = document.documentElement;
@@ -37,13 +36,6 @@ PANELS = """() => {
     }).map(text => text.textContent),
   };
 }"""
-
-
-def log_of(seconds_a_move: float, end: float) -> list[Entry]:
-    """Moves at even times, then submitted `end` metres off."""
-    poses = [at(x, 8.0 * x) for x in (*NEARER, end)]
-    moves = [moved(1.0 + seconds_a_move * i, "set_pose", T) for i, T in enumerate(poses, start=1)]
-    return [Entry(0.0, "opened"), view(1.0, 0.0), *moves, moved(moves[-1].seconds, "submit", poses[-1])]
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,10 @@ from app.views3d.cloud_view import COARSE_POINTS
 from registration_core.geometry import pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import DRAWN_FINELY, take_picture
+from tests.e2e.demo_truth import true_pose
 from tests.e2e.gizmo import view_frame, wait_for_picture
+from tests.e2e.labelling_page import LabellingPage
 from tests.e2e.test_image import Image
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_readme import true_pose
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -53,15 +53,15 @@ def image(server: Server, browser: Browser) -> Iterator[Image]:
     page = context.new_page()
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.goto(server.new_link("operator who looks"))
-    yield Image(Desk(page, server, "mug"))
+    yield Image(LabellingPage(page, server, "mug"))
     context.close()
     assert problems == []
 
 
 def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
-    desk, page = image.desk, image.page
-    start, end = desk.take_hold("tz", 0.08)
-    wait_until(lambda: desk.state["dragging"], "the drag")
+    labelling, page = image.labelling, image.page
+    start, end = labelling.take_hold("tz", 0.08)
+    wait_until(lambda: labelling.state["dragging"], "the drag")
     before, began = page.evaluate("redraws"), time.monotonic()
     moves = redraws = 0
     passed = 0.0
@@ -69,7 +69,7 @@ def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
         page.mouse.move(*(start + (end - start) * abs(np.sin(passed))))
         moves, passed = moves + 1, time.monotonic() - began
         redraws = page.evaluate("redraws") - before
-    assert desk.state["dragging"]
+    assert labelling.state["dragging"]
     page.mouse.up()
     print(f"{moves / passed:.1f} moves and {redraws / passed:.1f} redraws of the outline a second")
     assert redraws >= 5
@@ -91,14 +91,14 @@ def dominant(image: Image) -> str:
 
 
 def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
-    desk, page = image.desk, image.page
+    labelling, page = image.labelling, image.page
     T_world_camera = np.array(image.frames[0]["T_world_camera"])
-    truth = pose.inverse(T_world_camera) @ true_pose(desk.task["object"]["obj_id"])
+    truth = pose.inverse(T_world_camera) @ true_pose(labelling.task["object"]["obj_id"])
     image.put(truth)
     share = page.locator("#agreement-share")
-    expect(share).to_have_text(f"{100 * desk.state['agreement']['inlier_share']:.0f} %")
-    assert desk.state["agreement"]["inlier_share"] > 0.9
-    assert desk.state["agreement"]["median_residual"] < 0.002
+    expect(share).to_have_text(f"{100 * labelling.state['agreement']['inlier_share']:.0f} %")
+    assert labelling.state["agreement"]["inlier_share"] > 0.9
+    assert labelling.state["agreement"]["median_residual"] < 0.002
     expect(page.locator("#verdicts")).to_be_hidden()
     page.keyboard.press("r")
     expect(page.locator("#verdicts")).to_be_visible()
@@ -106,12 +106,12 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
     for T, verdict in ((truth, "match"), (NEARER @ truth, "in_front"), (FARTHER @ truth, "behind")):
         image.put(T)
         wait_until(lambda verdict=verdict: dominant(image) == verdict, f"the colour of {verdict}", 40)
-        shown = desk.state["agreement"][verdict]
+        shown = labelling.state["agreement"][verdict]
         row = page.locator(f"[data-verdict={verdict}] output")
         expect(row).to_have_text(f"{100 * shown:.0f} %")
         assert shown > 0.7
-        desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
-        wait_for_picture(desk.frame)
+        labelling.frame.wait_for_function(IS_DRAWN, arg="/object/mesh/surface")
+        wait_for_picture(labelling.frame)
         page.emulate_media(color_scheme="dark" if verdict == "behind" else "light")
         take_picture(page, f"label-agreement-{verdict}")
     page.get_by_role("button", name="Agreement").click()
@@ -122,16 +122,16 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
 def test_software_draws_few_points_unless_all_are_asked_for(
     server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    desk = Desk(open_page(server.new_link("without a graphics card")), server, "mug")
-    page = desk.page
+    labelling = LabellingPage(open_page(server.new_link("without a graphics card")), server, "mug")
+    page = labelling.page
     fine = page.get_by_role("button", name="Fine")
     expect(fine).to_have_attribute("aria-pressed", "false")
-    desk.frame.wait_for_function(POINTS_DRAWN, arg=[1, COARSE_POINTS])
-    assert desk.frame.evaluate(SHARPNESS) == pytest.approx(0.5, abs=0.01)
-    wait_for_picture(desk.frame)
+    labelling.frame.wait_for_function(POINTS_DRAWN, arg=[1, COARSE_POINTS])
+    assert labelling.frame.evaluate(SHARPNESS) == pytest.approx(0.5, abs=0.01)
+    wait_for_picture(labelling.frame)
     take_picture(page, "label-coarse")
     page.keyboard.press("Shift+F")
-    desk.frame.wait_for_function(POINTS_DRAWN, arg=[COARSE_POINTS + 1, 300_000])
+    labelling.frame.wait_for_function(POINTS_DRAWN, arg=[COARSE_POINTS + 1, 300_000])
     page.reload()
     frame = view_frame(page)
     assert frame.evaluate(SHARPNESS) == pytest.approx(1.0, abs=0.01)
@@ -145,19 +145,19 @@ HIDDEN = {"cloud": False, "mesh": False, "texture": True, "fine": True, "agreeme
 
 
 def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: Image) -> None:
-    desk, page = image.desk, image.page
+    labelling, page = image.labelling, image.page
     texture = page.get_by_role("button", name="Texture")
     expect(texture).to_have_attribute("aria-pressed", "true")
-    desk.frame.wait_for_function(IS_DRAWN, arg="/object/textured")
-    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/mesh")
-    wait_for_picture(desk.frame)
+    labelling.frame.wait_for_function(IS_DRAWN, arg="/object/textured")
+    labelling.frame.wait_for_function(IS_HIDDEN, arg="/object/mesh")
+    wait_for_picture(labelling.frame)
     take_picture(page, "label-texture")
     page.keyboard.press("Shift+M")
     expect(texture).to_have_attribute("aria-pressed", "false")
-    desk.frame.wait_for_function(IS_DRAWN, arg="/object/mesh")
-    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
+    labelling.frame.wait_for_function(IS_DRAWN, arg="/object/mesh")
+    labelling.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
     page.reload()
-    frame = desk.frame = view_frame(page)
+    frame = labelling.frame = view_frame(page)
     expect(texture).to_have_attribute("aria-pressed", "false")  # as the browser remembers
     frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
     texture.click()
@@ -170,17 +170,17 @@ def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: Image
 
 
 def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
-    desk, page = image.desk, image.page
-    assert page.request.post(f"{desk.url}/reset").ok
+    labelling, page = image.labelling, image.page
+    assert page.request.post(f"{labelling.url}/reset").ok
     page.keyboard.press("b")
-    desk.frame.wait_for_function(IS_HIDDEN, arg="/cloud")
+    labelling.frame.wait_for_function(IS_HIDDEN, arg="/cloud")
     page.get_by_role("button", name="Mesh").click()
-    desk.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
+    labelling.frame.wait_for_function(IS_HIDDEN, arg="/object/textured")
     expect(page.get_by_role("button", name="Cloud")).to_have_attribute("aria-pressed", "false")
-    assert desk.drag("tz", 0.05)["dof"] == ["tz"]  # the gizmo stays
+    assert labelling.drag("tz", 0.05)["dof"] == ["tz"]  # the gizmo stays
     take_picture(page, "label-layers-hidden")
-    assert page.request.put(f"{desk.url}/layers", data={}).ok  # as after the server was restarted
-    wait_until(lambda: desk.state["layers"] == HIDDEN, "what was chosen")
+    assert page.request.put(f"{labelling.url}/layers", data={}).ok  # as after the server was restarted
+    wait_until(lambda: labelling.state["layers"] == HIDDEN, "what was chosen")
     page.keyboard.press("m")
     page.keyboard.press("b")  # at once: neither is lost
-    wait_until(lambda: desk.state["layers"] == {**HIDDEN, "cloud": True, "mesh": True}, "both")
+    wait_until(lambda: labelling.state["layers"] == {**HIDDEN, "cloud": True, "mesh": True}, "both")

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import expect_new_view, view_frame
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server, run_snap6d
 
 pytestmark = pytest.mark.e2e
@@ -17,15 +17,15 @@ SLOWEST = 60_000
 PASSWORD = "correct horse battery"
 
 
-def end_login(desk: Desk) -> None:
+def end_login(labelling: LabellingPage) -> None:
     """The cookie stays with the browser, as it does when a login expires; the server knows it no more.
 
     The 3-D view loses its connection with it, and gets another one once somebody is signed in again.
     """
-    expect_new_view(desk.frame)
-    cookies = desk.page.context.cookies()
-    assert desk.page.request.post(f"{desk.root}/api/sign-out").ok
-    desk.page.context.add_cookies(cookies)
+    expect_new_view(labelling.frame)
+    cookies = labelling.page.context.cookies()
+    assert labelling.page.request.post(f"{labelling.root}/api/sign-out").ok
+    labelling.page.context.add_cookies(cookies)
 
 
 def secret_in(printed: str) -> str:
@@ -36,11 +36,11 @@ def secret_in(printed: str) -> str:
 def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Callable[[str], Page]) -> None:
     typed = f"{PASSWORD}\n{PASSWORD}\n"
     added = run_snap6d(server.state_dir, "user", "add", "expired", "--password", typed=typed).stdout
-    desk = Desk(open_page(f"{server.url}/sign-in#{secret_in(added)}"), server)
-    page, start = desk.page, desk.pose
+    labelling = LabellingPage(open_page(f"{server.url}/sign-in#{secret_in(added)}"), server)
+    page, start = labelling.page, labelling.pose
     dialog = page.locator("#sign-in-again")
-    desk.drag("tx", 0.02)
-    end_login(desk)
+    labelling.drag("tx", 0.02)
+    end_login(labelling)
     page.keyboard.press("Control+z")
     expect(dialog).to_be_visible()
     expect(dialog.get_by_label("Name")).to_have_value("expired")
@@ -64,22 +64,22 @@ def test_a_login_that_ended_is_renewed_in_place(server: Server, open_page: Calla
     page.bring_to_front()
     dialog.get_by_role("button", name="I have signed in there").click()
     expect(dialog).to_be_hidden()
-    desk.frame = view_frame(page)
-    desk.events("undo")  # what was asked for when the login had ended
-    assert np.allclose(desk.pose, start)
+    labelling.frame = view_frame(page)
+    labelling.events("undo")  # what was asked for when the login had ended
+    assert np.allclose(labelling.pose, start)
 
     expect(page.locator("#connection")).to_be_hidden()
-    end_login(desk)
+    end_login(labelling)
     page.keyboard.press("Control+Shift+z")
     dialog.get_by_label("Password").fill(PASSWORD)
     page.keyboard.press("Enter")
     expect(dialog).to_be_hidden()
-    desk.events("redo")
-    desk.frame = view_frame(page)
-    desk.drag("tz", 0.02)
+    labelling.events("redo")
+    labelling.frame = view_frame(page)
+    labelling.drag("tz", 0.02)
 
 
 def test_the_stream_notices_that_the_login_ended(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.sign_in_link), server)
-    end_login(desk)
-    expect(desk.page.locator("#sign-in-again")).to_be_visible(timeout=SLOWEST)
+    labelling = LabellingPage(open_page(server.sign_in_link), server)
+    end_login(labelling)
+    expect(labelling.page.locator("#sign-in-again")).to_be_visible(timeout=SLOWEST)

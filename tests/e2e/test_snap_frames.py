@@ -7,13 +7,13 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_machine import Open, open_desk
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.test_machine import Open, open_labelling
 from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
 
-__all__ = ["open_desk"]
+__all__ = ["open_labelling"]
 
 
 @pytest.fixture(scope="module")
@@ -23,9 +23,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
-def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk: Open) -> None:
-    desk = open_desk("snap")
-    page = desk.page
+def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_labelling: Open) -> None:
+    labelling = open_labelling("snap")
+    page = labelling.page
     only, status = page.locator("#this-frame-only"), page.locator("#snap-status")
     expect(only).to_have_attribute("aria-pressed", "false")
     page.keyboard.press("Space")
@@ -37,15 +37,15 @@ def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk
     page.keyboard.press("Space")
     expect(status).to_contain_text("1 frame, 2 of 2 others agree")
     take_picture(page, "snap-frames-one")
-    used = [event["detail"]["used_frames"] for event in desk.events("snap_requested", 2)]
+    used = [event["detail"]["used_frames"] for event in labelling.events("snap_requested", 2)]
     assert [len(frames) for frames in used] == [2, 1]
 
-    assert page.request.put(f"{desk.url}/snap-frames", data={"frames": "auto"}).ok
+    assert page.request.put(f"{labelling.url}/snap-frames", data={"frames": "auto"}).ok
     expect(only).to_have_attribute("aria-pressed", "false")
     page.reload()
     expect(only).to_have_attribute("aria-pressed", "true")  # as the browser remembers
 
-    desk.submit()
+    labelling.submit()
     page.locator("#replay").click()
     applied = page.locator("#events li").filter(has_text="Snap applied")
     expect(applied.nth(0)).to_contain_text("2 frames, 1 of 1 other agrees")
@@ -56,6 +56,6 @@ def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_desk
 def test_a_compared_technique_has_no_choice_of_frames(
     server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    desk = Desk(open_page(server.new_link("one frame", "admin")), server, "box", "live snap")
-    expect(desk.page.locator("#undo")).to_be_visible()
-    expect(desk.page.locator("#this-frame-only")).to_be_hidden()
+    labelling = LabellingPage(open_page(server.new_link("one frame", "admin")), server, "box", "live snap")
+    expect(labelling.page.locator("#undo")).to_be_visible()
+    expect(labelling.page.locator("#this-frame-only")).to_be_hidden()

@@ -17,7 +17,7 @@ from registration_core.bop.images import read_depth
 from registration_core.geometry import pose
 from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import pixel
-from tests.e2e.test_precision import DEMO, MODEL, PreciseDesk, true_pose
+from tests.e2e.test_precision import DEMO, MODEL, PreciseLabellingPage, true_pose
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -33,18 +33,20 @@ TURN = 0.01
 
 
 @pytest.fixture
-def desk(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> PreciseDesk:
+def labelling(
+    server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest
+) -> PreciseLabellingPage:
     """A new operator before the bottle of the first scene."""
     name = re.sub(r"\W", "-", request.node.name)[:60]
-    return PreciseDesk(drawing_finely(open_page(server.new_link(name))), server, "bottle")
+    return PreciseLabellingPage(drawing_finely(open_page(server.new_link(name))), server, "bottle")
 
 
 class ObjectView:
     """Where points of the object are in its own view."""
 
-    def __init__(self, desk: PreciseDesk) -> None:
-        self.page = desk.page
-        self.rotation = (pose.inverse(desk.T_world_camera) @ desk.pose)[:3, :3]
+    def __init__(self, labelling: PreciseLabellingPage) -> None:
+        self.page = labelling.page
+        self.rotation = (pose.inverse(labelling.T_world_camera) @ labelling.pose)[:3, :3]
         low, high = MODEL.vertices.min(axis=0), MODEL.vertices.max(axis=0)
         self.middle = (low + high) / 2
         self.radius = np.linalg.norm(MODEL.vertices - self.middle, axis=1).max()
@@ -92,9 +94,9 @@ def well_seen(*eyes: Array) -> Array:
     return points[seen]
 
 
-def measured(desk: PreciseDesk, points: Array, T_world_object: Array) -> Array:
+def measured(labelling: PreciseLabellingPage, points: Array, T_world_object: Array) -> Array:
     """Those of the points (N, 3), in the object's frame, that the sensor saw, nothing before them."""
-    info, T_world_camera, folder = desk.frame_info, desk.T_world_camera, DEMO / "test/000001"
+    info, T_world_camera, folder = labelling.frame_info, labelling.T_world_camera, DEMO / "test/000001"
     depth = read_depth(folder / f"depth/{info['image_id']:06d}.png", info["depth_scale"])
     camera = Intrinsics(info["width"], info["height"], **info["intrinsics"])
     in_world = pose.apply(T_world_object, points)
@@ -112,16 +114,16 @@ def wide_triangle(points: Array) -> Array:
     return np.array(max(itertools.combinations(some, 3), key=lambda corners: area(*corners)))
 
 
-def test_three_points_place_the_object_and_a_snap_follows(desk: PreciseDesk) -> None:
-    page = desk.page
-    truth = true_pose(desk)
+def test_three_points_place_the_object_and_a_snap_follows(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    truth = true_pose(labelling)
     page.keyboard.press("t")
     expect(page.locator("#pairs")).to_be_visible(timeout=SLOW)
     expect(page.locator("#pairs-next")).to_contain_text("point 1 on the object")
-    view = ObjectView(desk)
+    view = ObjectView(labelling)
     view.drag(40, 12)
-    sensor = (pose.inverse(truth) @ desk.T_world_camera)[:3, 3]
-    points = wide_triangle(measured(desk, well_seen(view.eye, sensor), truth))
+    sensor = (pose.inverse(truth) @ labelling.T_world_camera)[:3, 3]
+    points = wide_triangle(measured(labelling, well_seen(view.eye, sensor), truth))
     in_world = pose.apply(truth, points)
 
     view.click(points[0])
@@ -134,23 +136,23 @@ def test_three_points_place_the_object_and_a_snap_follows(desk: PreciseDesk) -> 
         view.click(point)
         expect(page.locator("#object-marks > span")).to_have_count(number, timeout=SLOW)
         if number == 2:  # once in the cloud
-            local = pose.apply(pose.inverse(desk.pose), place) - MODEL.centre
-            page.mouse.click(*pixel(page, desk.frame, local))
+            local = pose.apply(pose.inverse(labelling.pose), place) - MODEL.centre
+            page.mouse.click(*pixel(page, labelling.frame, local))
         else:
-            page.mouse.click(*desk.image_place(place))
+            page.mouse.click(*labelling.image_place(place))
         expect(page.locator("#image-marks > span")).to_have_count(number, timeout=SLOW)
         if number == 2:
-            desk.frame.wait_for_function("() => window.__viserMutable.nodeRefFromName['/marks/2']")
+            labelling.frame.wait_for_function("() => window.__viserMutable.nodeRefFromName['/marks/2']")
             take_picture(page, "label-three-points-half-way")
 
-    (event,) = desk.events("set_pose")
+    (event,) = labelling.events("set_pose")
     assert event["detail"]["technique"] == "three points"
     picked = np.array([pair["on_object"] for pair in event["detail"]["pairs"]])
     assert np.linalg.norm(picked - points, axis=1).max() < 0.004
-    desk.events("snap_applied")
+    labelling.events("snap_applied")
     expect(page.locator("#pairs-rms")).to_contain_text("mm (rms)", timeout=SLOW)
     expect(page.locator("#pair-list li")).to_have_count(3)
-    assert np.linalg.norm(pose.apply(desk.pose, MODEL.centre) - pose.apply(truth, MODEL.centre)) < 0.005
+    assert np.linalg.norm(pose.apply(labelling.pose, MODEL.centre) - pose.apply(truth, MODEL.centre)) < 0.005
     take_picture(page, "label-three-points")
     page.emulate_media(color_scheme="dark")
     take_picture(page, "label-three-points-dark")
@@ -160,16 +162,16 @@ def test_three_points_place_the_object_and_a_snap_follows(desk: PreciseDesk) -> 
     expect(page.locator("#pairs")).to_be_hidden()
     for count in (1, 2):  # the snap, then the three points
         page.keyboard.press("Control+z")
-        desk.events("undo", count)
-    assert np.allclose(desk.pose, event["T_before"])
+        labelling.events("undo", count)
+    assert np.allclose(labelling.pose, event["T_before"])
 
 
-def test_pairs_that_do_not_fit_are_said_and_can_be_taken_out(desk: PreciseDesk) -> None:
-    page = desk.page
-    before = desk.pose
+def test_pairs_that_do_not_fit_are_said_and_can_be_taken_out(labelling: PreciseLabellingPage) -> None:
+    page = labelling.page
+    before = labelling.pose
     page.locator("#three-points").click()
     expect(page.locator("#pairs")).to_be_visible(timeout=SLOW)
-    view = ObjectView(desk)
+    view = ObjectView(labelling)
     points = wide_triangle(well_seen(view.eye))
     for number, point in enumerate(points, start=1):
         view.click(point)
@@ -186,22 +188,22 @@ def test_pairs_that_do_not_fit_are_said_and_can_be_taken_out(desk: PreciseDesk) 
     page.keyboard.press("p")  # another mode takes its place
     expect(page.locator("#pairs")).to_be_hidden()
     expect(page.locator("#place-mode")).to_be_visible()
-    assert np.array_equal(desk.pose, before)
+    assert np.array_equal(labelling.pose, before)
 
 
 def test_another_operators_pose_is_copied_by_keys(
-    server: Server, open_page: Callable[[str], Page], desk: PreciseDesk
+    server: Server, open_page: Callable[[str], Page], labelling: PreciseLabellingPage
 ) -> None:
     colleague = open_page(server.new_link("Nadia"))
     colleague.wait_for_url(f"{server.url}/")
     root = f"{server.url}/api"
-    theirs = colleague.request.post(f"{root}/tasks/{desk.task['id']}/registration").json()
+    theirs = colleague.request.post(f"{root}/tasks/{labelling.task['id']}/registration").json()
     wanted = pose.exp([0.02, 0, 0.01, 0, 0, 0.3]) @ np.array(theirs["T_world_object"])
     url = f"{root}/registrations/{theirs['id']}"
     colleague.request.put(f"{url}/pose", data={"T_world_object": wanted.tolist()})
     assert colleague.request.post(f"{url}/submit").ok
 
-    page = desk.page
+    page = labelling.page
     page.keyboard.press("c")
     copies = page.locator("#copies")
     expect(copies).to_be_visible(timeout=SLOW)
@@ -212,11 +214,11 @@ def test_another_operators_pose_is_copied_by_keys(
     expect(copies).to_be_hidden()
     page.locator("#copy").click()
     copies.locator("button", has_text="Nadia").focus()
-    event = desk.press("Enter")
+    event = labelling.press("Enter")
     assert event["detail"]["technique"] == "copy"
     assert event["detail"]["source"]["registration_id"] == theirs["id"]
-    assert np.allclose(desk.pose, wanted)
-    assert desk.state["state"] == "open"  # Enter has chosen, not submitted
+    assert np.allclose(labelling.pose, wanted)
+    assert labelling.state["state"] == "open"  # Enter has chosen, not submitted
     page.keyboard.press("Control+z")
-    desk.events("undo")
-    assert np.allclose(desk.pose, event["T_before"])
+    labelling.events("undo")
+    assert np.allclose(labelling.pose, event["T_before"])

@@ -8,6 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, pull, take_hold, view_frame
+from tests.e2e.labelling_page import scale_of_gizmo
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -44,14 +45,6 @@ def set_up(page: Page, server: Server, name: str) -> str:
     expect(page.get_by_role("button", name="Invite: novice (1 of 1)")).to_be_disabled()
     take_picture(page, "study-invited")
     return page.locator("#link-list code").inner_text()
-
-
-def scale_of_gizmo(page: Page) -> float:
-    """Of the task that the page shows, metres."""
-    root, _, task_id = page.url.rpartition("/label/")
-    task = page.request.get(f"{root}/api/tasks/{task_id}").json()
-    item = page.request.get(f"{root}/api/objects/{task['object']['id']}").json()
-    return 0.75 * float(item["diameter"])
 
 
 def do_task(page: Page, first_picture: str | None = None) -> str:

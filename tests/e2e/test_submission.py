@@ -9,10 +9,10 @@ from playwright.sync_api import Page, expect
 
 from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
+from tests.e2e.demo_truth import true_pose
 from tests.e2e.gizmo import view_frame
-from tests.e2e.test_labelling import Desk
-from tests.e2e.test_readme import true_pose
-from tests.e2e.test_trial import participant_link
+from tests.e2e.labelling_page import LabellingPage
+from tests.e2e.participants import participant_link
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -21,8 +21,8 @@ SLOWEST = 60_000
 
 
 def test_an_untouched_start_pose_is_asked_about(server: Server, open_page: Callable[[str], Page]) -> None:
-    desk = Desk(open_page(server.new_link("hasty")), server)
-    page = desk.page
+    labelling = LabellingPage(open_page(server.new_link("hasty")), server)
+    page = labelling.page
     expect(page.locator("#submit")).to_be_enabled()
     page.keyboard.press("Enter")
     question = page.locator("#unsure")
@@ -34,39 +34,39 @@ def test_an_untouched_start_pose_is_asked_about(server: Server, open_page: Calla
     page.keyboard.press("Escape")
     expect(question).to_be_hidden()
     expect(page.locator("#submit")).to_be_visible()
-    assert desk.state["state"] == "open"
+    assert labelling.state["state"] == "open"
 
     page.locator("#submit").dblclick()  # the second click is no answer
     page.keyboard.press("Escape")
-    assert desk.state["state"] == "open"
+    assert labelling.state["state"] == "open"
     page.keyboard.press("Enter")
     expect(question).to_be_visible()
     page.keyboard.press("Enter")
-    desk.events("submit")
+    labelling.events("submit")
     expect(question).to_be_hidden()
     expect(page.locator("#submitted")).to_be_visible()
-    assert page.request.post(f"{desk.url}/reopen").ok  # snaps of other tests would take it for true
+    assert page.request.post(f"{labelling.url}/reopen").ok  # snaps of other tests would take it for true
 
 
 def test_a_pose_that_hardly_agrees_with_depth_is_asked_about(
     server: Server, open_page: Callable[[str], Page]
 ) -> None:
-    desk = Desk(open_page(server.new_link("careless")), server, "mug")
-    page, question = desk.page, desk.page.locator("#unsure")
-    truth = true_pose(desk.task["object"]["obj_id"])
+    labelling = LabellingPage(open_page(server.new_link("careless")), server, "mug")
+    page, question = labelling.page, labelling.page.locator("#unsure")
+    truth = true_pose(labelling.task["object"]["obj_id"])
     off = pose.perturbed(truth, 0.03, np.radians(20), np.random.default_rng(1))
     share = page.locator("#agreement-share")
     for T_world_object, agreeing in ((truth, re.compile(r"^(9\d|100) %")), (off, re.compile(r"^[1-4]?\d %"))):
-        assert page.request.put(f"{desk.url}/pose", data={"T_world_object": T_world_object.tolist()}).ok
+        assert page.request.put(f"{labelling.url}/pose", data={"T_world_object": T_world_object.tolist()}).ok
         expect(share).to_have_text(agreeing)
     page.keyboard.press("Enter")
     expect(question).to_contain_text("of the depth agrees; a right pose has 94 % or more")
     take_picture(page, "label-unsure-off")
     page.keyboard.press("Control+z")
     expect(question).to_be_hidden()  # it was about another pose
-    desk.events("undo")
+    labelling.events("undo")
     page.keyboard.press("Enter")
-    desk.events("submit")
+    labelling.events("submit")
     expect(question).to_be_hidden()
 
 

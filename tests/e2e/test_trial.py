@@ -2,30 +2,19 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from secrets import token_hex
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import Handle, pull, take_hold, view_frame
-from tests.e2e.test_study import scale_of_gizmo
+from tests.e2e.labelling_page import scale_of_gizmo
+from tests.e2e.participants import participant_link
 from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
 
 SLOWEST = 60_000
-
-
-def participant_link(admin: Page, server: Server) -> str:
-    """Of a new study of one thing, quickly and by hand alone; there is no consent and no practice."""
-    task = admin.request.get(f"{server.url}/api/tasks").json()["items"][0]
-    thing = {"scene_id": task["scene"]["id"], "object_id": task["object"]["id"]}
-    plan = {"tasks": [thing], "modes": ["quick"], "groups": {"novice": 1}}
-    studies = f"{server.url}/api/studies"
-    study = admin.request.post(studies, data={"name": f"Trouble {token_hex(3)}", "plan": plan}).json()
-    invited = admin.request.post(f"{studies}/{study['id']}/participants", data={"group": "novice"})
-    return str(invited.json()["link"])
 
 
 def open_again(page: Page, link: str) -> Page:

@@ -8,7 +8,7 @@ from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame
-from tests.e2e.test_labelling import Desk
+from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -18,7 +18,7 @@ SLOWEST = 60_000
 
 
 def test_the_newer_tab_takes_over(server: Server, open_page: Callable[[str], Page]) -> None:
-    older = Desk(open_page(server.new_link("two-tabs")), server)
+    older = LabellingPage(open_page(server.new_link("two-tabs")), server)
     kept = older.drag("tx", 0.02)["T_after"]
     newer = older.page.context.new_page()
     newer.goto(older.page_url)

@@ -9,7 +9,7 @@ from distributed import LocalCluster
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.test_labelling import SLOW_SNAP, Desk
+from tests.e2e.labelling_page import SLOW_SNAP, LabellingPage
 from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
@@ -36,7 +36,7 @@ def server(cluster: LocalCluster, tmp_path: Path) -> Iterator[Server]:
 def test_it_is_told_what_a_snap_waits_for(
     server: Server, cluster: LocalCluster, open_page: Callable[[str], Page]
 ) -> None:
-    ann = Desk(open_page(server.sign_in_link), server, "mug")
+    ann = LabellingPage(open_page(server.sign_in_link), server, "mug")
     status, seconds = ann.page.locator("#snap-status"), ann.page.locator("#snap-seconds")
     ann.page.keyboard.press("Space")
     expect(status).to_contain_text("No worker is there", timeout=SLOWEST)
@@ -58,7 +58,7 @@ def test_it_is_told_what_a_snap_waits_for(
     take_picture(ann.page, "label-slow-worker")
     page = ann.page.context.new_page()
     page.goto(server.url)
-    other = Desk(page, server, "box")
+    other = LabellingPage(page, server, "box")
     page.keyboard.press("Space")
     expect(page.locator("#snap-status")).to_contain_text("yours is next", timeout=SLOWEST)
     take_picture(page, "label-all-workers-busy")
