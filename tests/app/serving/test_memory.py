@@ -10,7 +10,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="glibc's memory 
 
 SCRIPT = """
 import numpy, psutil
-from app import memory
+from app.serving import memory
 
 def resident(): return psutil.Process().memory_info().rss
 
