@@ -107,7 +107,8 @@ def test_it_covers_every_module_that_a_result_runs_through():
 
 SNAP = """
 import numpy as np
-from registration_core import pose, snap
+from registration_core import snap
+from registration_core.geometry import pose
 from tests.registration_core.simple_scene import standing_tool
 scene = standing_tool()
 start = pose.perturbed(scene.truth, 0.03, 0.4, np.random.default_rng(0))
