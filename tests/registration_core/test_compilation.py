@@ -9,8 +9,9 @@ import sys
 import numpy as np
 import trimesh
 from numba.core.dispatcher import Dispatcher
-from registration_core import SnapConfig, pose, propose, region_of_interest, snap, snap_steps, snap_views
+from registration_core import SnapConfig, propose, region_of_interest, snap, snap_steps, snap_views
 from registration_core import color_is_aligned, warm_up
+from registration_core.geometry import pose
 from registration_core.synthetic.objects import demo_objects
 from registration_core.rendering.rasterizer import render_depth
 from tests.registration_core.simple_scene import standing_tool
