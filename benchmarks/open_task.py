@@ -10,7 +10,7 @@ from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import known_tasks, write_full_frames
 from benchmarks.server import RunningServer, prepare_state, running_server
-from benchmarks.viser_client import GIZMO
+from tests.app.labeling.viser_client import GIZMO
 
 TITLE = "Opening a task: from POST /api/tasks/{id}/registration to the whole scene on the wire"
 TARGET = Target(1.0)

@@ -67,7 +67,7 @@ async def _measure(server: RunningServer, tasks: int | None, snaps: int) -> list
         *spread("Cancel of a paper() run to cancelled", cancels, CANCEL_TARGET),
         Figure(
             "right poses (ADD-S below a tenth of the diameter)",
-            100 * np.mean([s.is_right for s in later]),
+            100 * float(np.mean([s.is_right for s in later])),
             "%",
         ),
     ]

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -71,7 +71,7 @@ class ViewClient:
         async with asyncio.timeout(seconds):
             await self._loaded.wait()
 
-    async def drag(self, T_world_gizmo: Sequence[Array]) -> list[float]:
+    async def drag(self, T_world_gizmo: Iterable[Array]) -> list[float]:
         """Take the gizmo, move it through these poses (4, 4) as quickly as a page does, and let go.
 
         Returns:

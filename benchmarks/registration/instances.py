@@ -129,6 +129,7 @@ def sensor_instances(set_name: str, an_object: int, most_scenes: int = MOST_SCEN
     family = FAMILIES[set_name.removeprefix("sensor: ")]
     found = []
     for number, one in enumerate(_half_visible(an_object, most_scenes)):
+        assert one.perfect_depth is not None
         rng = np.random.default_rng([SENSORS.index(set_name), number])
         depth = measure(one.perfect_depth, one.camera, rng, draw_sensor(family, rng))
         found.append(replace(one, set_name=set_name, depth=depth))

@@ -39,7 +39,7 @@ def write_overlays(folder: Path, instances: Sequence[Instance], trials: Sequence
     """A PNG for each failure of the default, and montages of ten of a set, the most confident ones first."""
     folder.mkdir(parents=True, exist_ok=True)
     failures = [trial for trial in trials if trial.method == DEFAULT and not trial.error.is_right]
-    failures.sort(key=lambda trial: -trial.confidence)
+    failures.sort(key=lambda trial: -trial.claim)
     for set_name in dict.fromkeys(trial.set_name for trial in failures):
         pictures = []
         for trial in (trial for trial in failures if trial.set_name == set_name):

@@ -107,6 +107,12 @@ def _mug_views(scene_id: int, family: SensorFamily) -> list[Instance]:
     ]  # fmt: skip
 
 
+def camera_pose(view: Instance) -> Array:
+    """`T_world_camera` (4, 4) of a view of a group: the views of one are in a common world."""
+    assert view.T_world_camera is not None
+    return view.T_world_camera
+
+
 def tells_the_handle(view: Instance) -> bool:
     """Whether depth contradicts every turn of the mug about its body."""
     return not any(fits_as_well(view, view.truth @ turned_mug(angle)) for angle in TURNS)
@@ -123,13 +129,13 @@ def _exact(group: Group) -> list[bool]:
     """Of starts about the object as its first view shows it."""
     first = group.views[0]
     judge = Judge(first.model)
-    views = [(one.depth, one.camera, one.T_world_camera) for one in group.views]
+    views = [(one.depth, one.camera, camera_pose(one)) for one in group.views]
     colors = [one.aligned_color for one in group.views]
-    truth = pose.mean(np.array([one.T_world_camera @ one.truth for one in group.views]))
+    truth = pose.mean(np.array([camera_pose(one) @ one.truth for one in group.views]))
     begun = starts(first.truth, first.model, first.camera, group.shell, group.starts, first.seed)
     flags = []
     for n, T_start in enumerate(begun):
-        T_world_object = pose.orthonormalised(first.T_world_camera @ T_start)
+        T_world_object = pose.orthonormalised(camera_pose(first) @ T_start)
         estimate = snap_views(first.model, views, T_world_object, rng=np.random.default_rng(n), colors=colors)
         flags.append(judge.error(estimate.T_world_object, truth).is_exact)
     return flags

@@ -59,7 +59,7 @@ def print_confidences(console: Console, trials: Sequence[Trial]) -> None:
         table.add_column(column, justify="right")
     for name in dict.fromkeys(trial.set_name for trial in trials):
         own = [trial for trial in trials if trial.set_name == name]
-        claims, scenes = [trial.confidence for trial in own], [trial.scene for trial in own]
+        claims, scenes = [trial.claim for trial in own], [trial.scene for trial in own]
         exact = [trial.error.is_exact for trial in own]
         shares = [
             share_over_scenes(exact, scenes),
@@ -87,7 +87,7 @@ def print_reliability(console: Console, trials: Sequence[Trial], title: str) -> 
     table = Table(title=f"Confidence, {title}", title_justify="left")
     for column in ("claimed %", "right %", "results"):
         table.add_column(column, justify="right")
-    claims = [trial.confidence for trial in trials]
+    claims = [trial.claim for trial in trials]
     for part in reliability(claims, [trial.error.is_exact for trial in trials]):
         table.add_row(f"{100 * part.confidence:.1f}", f"{100 * part.correct:.1f}", str(part.count))
     console.print(table)

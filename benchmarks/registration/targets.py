@@ -166,7 +166,7 @@ def _times(trials: Sequence[Trial]) -> Iterable[Figure]:
         if pairs := _pairs(own, PROTOTYPE):
             name = f"{title}, median time of a default snap, of that of the {PROTOTYPE}"
             yield Figure(name, _time_ratio(pairs), "times", FASTER)
-        doubtful = [t.seconds for t in own if t.method == DEFAULT and t.confidence < DOUBT]
+        doubtful = [t.seconds for t in own if t.method == DEFAULT and t.claim < DOUBT]
         if doubtful:
             median, p95 = percentiles(doubtful)
             yield Figure(f"{title}, p95 of snaps in doubt, of their median", p95 / median, "times", STEADY)
@@ -190,7 +190,7 @@ def _confidences(trials: Sequence[Trial]) -> Iterable[Figure]:
         exact = [trial.error.is_exact for trial in own]
         if not own:
             continue
-        claims = [trial.confidence for trial in own]
+        claims = [trial.claim for trial in own]
         name = f"confidence, {set_name}"
         yield Figure(f"{name}, calibration error", 100 * calibration_error(claims, exact), "%", CALIBRATION)
         if any(exact) and not all(exact):
@@ -205,7 +205,7 @@ def _acceptance(trials: Sequence[Trial]) -> Iterable[Figure]:
     own = [trial for trial in trials if trial.set_name in REAL and trial.shell == MIDDLE]
     if not own:
         return
-    accepted = [trial for trial in own if trial.confidence >= threshold]
+    accepted = [trial for trial in own if trial.claim >= threshold]
     where = f"acceptance({RISK}), real, from {MIDDLE}"
     yield Figure(f"{where}, accepted", 100 * len(accepted) / len(own), "%", ACCEPTED)
     if accepted:

@@ -46,6 +46,12 @@ class Trial:
     seconds: float
     confidence: float | None
 
+    @property
+    def claim(self) -> float:
+        """The confidence, of a method that gives one."""
+        assert self.confidence is not None, self.method
+        return self.confidence
+
 
 @dataclass(frozen=True, eq=False)
 class InstanceTrials:

@@ -122,9 +122,9 @@ def test_fresh_generator_is_known_by_its_seed_and_moves_on() -> None:
 
 def test_global_random_state_is_left_alone(scene) -> None:
     np.random.seed(3)
-    before = np.random.get_state()[1].copy()
+    before = np.random.get_state(legacy=False)["state"]["key"].copy()
     run(scene, started(scene, 0.02, 15, 0))
-    np.testing.assert_array_equal(np.random.get_state()[1], before)
+    np.testing.assert_array_equal(np.random.get_state(legacy=False)["state"]["key"], before)
 
 
 @pytest.mark.parametrize("config", [SnapConfig(), SHORT_FILTER])

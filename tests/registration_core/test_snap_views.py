@@ -126,9 +126,9 @@ def test_steps_lead_to_the_estimate_in_the_world(views) -> None:
     for step in steps:
         np.testing.assert_allclose(step.particles[0], step.T_camera_object, atol=1e-6)
         assert pose.distance(step.T_camera_object, T_WORLD_OBJECT).translation < 0.07
-    np.testing.assert_array_equal(
-        steps[-1].estimate.T_world_object, run(views, start, config=config).T_world_object
-    )
+    estimate = steps[-1].estimate
+    assert isinstance(estimate, WorldEstimate)
+    np.testing.assert_array_equal(estimate.T_world_object, run(views, start, config=config).T_world_object)
 
 
 def test_the_first_round_alone_is_searched_where_the_start_fits_in_all_views(views) -> None:
@@ -136,7 +136,9 @@ def test_the_first_round_alone_is_searched_where_the_start_fits_in_all_views(vie
     steps = list(snap_views_steps(tool(), views, start, rng=np.random.default_rng(0)))
     a_round = 1 + len(SnapConfig().stages)
     assert len(steps) == 1 + a_round + 1
-    assert pose.distance(steps[-1].estimate.T_world_object, T_WORLD_OBJECT).translation < 0.003
+    estimate = steps[-1].estimate
+    assert isinstance(estimate, WorldEstimate)
+    assert pose.distance(estimate.T_world_object, T_WORLD_OBJECT).translation < 0.003
 
 
 def test_known_objects_are_left_out_of_the_view_that_shows_them(views) -> None:

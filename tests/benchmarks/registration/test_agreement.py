@@ -48,7 +48,8 @@ def test_sparse_and_exact_rank_alike(drill: Instance) -> None:
 
 
 def test_the_table_has_a_row_for_each_spread_and_weighing(drill: Instance) -> None:
-    console = Console(file=io.StringIO(), width=120)
+    written = io.StringIO()
+    console = Console(file=written, width=120)
     print_agreement(console, [drill])
-    lines = console.file.getvalue().splitlines()
+    lines = written.getvalue().splitlines()
     assert sum(any(name in line for name in WEIGHINGS) for line in lines) == len(SPREADS) * len(WEIGHINGS)

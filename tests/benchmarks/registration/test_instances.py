@@ -56,6 +56,7 @@ def test_other_sensors_measure_the_same_scenes(set_name: str, few: list[Instance
     measured = sensor_instances(set_name, 1, most_scenes=1)
     assert [one.object_name for one in measured] == [one.object_name for one in few]
     for one, plain in zip(measured, few, strict=True):
+        assert one.perfect_depth is not None and plain.perfect_depth is not None
         assert one.set_name == set_name and np.array_equal(one.perfect_depth, plain.perfect_depth)
         assert not np.array_equal(one.depth, plain.depth)
         drawn = render_depth(one.model, one.camera, one.truth)

@@ -8,7 +8,7 @@ import trimesh
 from PIL import Image
 
 from registration_core.bop import writer as bop_writer
-from registration_core.bop.dataset import BopFormatError, read_color, read_dataset, read_depth
+from registration_core.bop.dataset import BopFormatError, BopImage, read_color, read_dataset, read_depth
 from registration_core.geometry import pose
 from registration_core.geometry.camera import Intrinsics
 from registration_core.geometry.object_model import ContinuousSymmetry, ObjectModel, Symmetries
@@ -59,6 +59,7 @@ def test_what_was_written_is_read_back(dataset):
     assert (first.image_id, second.image_id) == (3, 12)
     assert first.camera == CAMERA
     assert first.T_world_camera == pytest.approx(T_WORLD_CAMERA)
+    assert first.ground_truth is not None and first.color is not None
     assert first.ground_truth[0].obj_id == 7
     assert first.ground_truth[0].T_camera_object == pytest.approx(T_CAMERA_OBJECT)
     assert second.ground_truth is None
@@ -120,6 +121,7 @@ def test_grey_jpeg_pictures_are_found(dataset):
     (dataset / SCENE / "gray").mkdir()
     Image.new("L", (32, 24), 77).save(dataset / SCENE / "gray/000003.jpg")
     image = read_dataset(dataset).scenes[0].images[0]
+    assert image.color is not None
     assert image.color.path.name == "000003.jpg"
     assert read_color(image.color.path).shape == (24, 32, 3)
 
@@ -340,6 +342,7 @@ def test_the_real_ycbv_scenes(shared_data):
     assert [(scene.scene_id, len(scene.images)) for scene in read.scenes] == [(1, 2), (2, 5)]
     assert read.objects[13].name == "025_mug"
     image = read.scenes[0].images[0]
+    assert image.ground_truth is not None
     assert {truth.obj_id for truth in image.ground_truth} == {8, 14, 21}
     assert read.scenes[1].images[0].ground_truth is None
     assert image.T_world_camera is None
@@ -350,6 +353,7 @@ def test_official_poses_fit_the_real_depth(shared_data):
     models = {known.obj_id: known.model for known in read.objects}
     image = read.scenes[0].images[0]
     observed = read_depth(image.depth.path, image.depth_scale)
+    assert image.ground_truth is not None
     for truth in image.ground_truth:
         rendered = render_depth(models[truth.obj_id], image.camera, truth.T_camera_object)
         shown = (rendered > 0) & (observed > 0) & (np.abs(rendered - observed) < 0.02)
@@ -357,10 +361,16 @@ def test_official_poses_fit_the_real_depth(shared_data):
         assert np.median(np.abs(rendered - observed)[shown]) < 0.004
 
 
+def world_pose(image: BopImage) -> np.ndarray:
+    """`T_world_object` (4, 4) of the first object in an image."""
+    assert image.T_world_camera is not None and image.ground_truth is not None
+    return image.T_world_camera @ image.ground_truth[0].T_camera_object
+
+
 def test_the_real_bunny_has_one_world(shared_data):
     # Camera and object poses come from different sources with one common offset: the object stands still.
     images = read_dataset(shared_data / "bunny").scenes[0].images
     assert len(images) == 24
-    in_world = [image.T_world_camera @ image.ground_truth[0].T_camera_object for image in images]
+    in_world = [world_pose(image) for image in images]
     corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
     assert max(add(T, in_world[0], corners) for T in in_world) < 0.01

@@ -53,7 +53,7 @@ def test_the_spread_is_the_error_to_be_expected(points, centre) -> None:
     for _ in range(600):
         found = pose_from_correspondences(points, clicked(points, rng, noise), noise, centre)
         T = found.T_camera_object
-        shift = np.linalg.norm(pose.apply(T, centre) - pose.apply(TRUTH, centre))
+        shift = float(np.linalg.norm(pose.apply(T, centre) - pose.apply(TRUTH, centre)))
         misses.append([shift, pose.rotation_angle(T[:3, :3].T @ TRUTH[:3, :3])])
         expected.append(found.start_spread)
     actual = np.sqrt(np.mean(np.square(misses), axis=0))

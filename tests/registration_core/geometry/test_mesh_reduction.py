@@ -63,7 +63,9 @@ def test_merging_closes_seams_and_drops_what_collapses() -> None:
     assert len(merged(torn[0], collapsed)[1]) == len(faces)
 
 
-@pytest.mark.parametrize("coarser", [lambda m: clustered(*m, 0.01), lambda m: decimated(*m, 300)])
+@pytest.mark.parametrize(
+    "coarser", [lambda m: clustered(m[0], m[1], 0.01), lambda m: decimated(m[0], m[1], 300)]
+)
 def test_a_coarser_ball_is_still_a_ball(coarser) -> None:
     vertices, faces = coarser(ball(4))
     assert 100 < len(faces) < 2000

@@ -7,7 +7,8 @@ import pytest
 import trimesh
 
 from registration_core import ObjectModel, Symmetries
-from registration_core.geometry.object_model import ContinuousSymmetry, discrete, read_mesh
+from registration_core.geometry.mesh_file import read_mesh
+from registration_core.geometry.object_model import ContinuousSymmetry, discrete
 
 BOX = trimesh.creation.box((0.3, 0.4, 1.2))
 

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.typing import ArrayLike
 
 from registration_core.geometry import pose
 
@@ -76,7 +77,7 @@ def test_checked_removes_rounding(twist) -> None:
     np.testing.assert_allclose(checked, T, atol=1e-5)
 
 
-BROKEN = {
+BROKEN: dict[str, ArrayLike] = {
     "of numbers": [["a"] * 4] * 4,
     "shape": np.eye(3),
     "NaN": np.full((4, 4), np.nan),

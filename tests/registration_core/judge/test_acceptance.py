@@ -76,8 +76,9 @@ def test_more_risk_accepts_no_less(count: int, wrong: float, seed: int) -> None:
 
 @given(st.lists(st.tuples(st.sampled_from([0.2, 0.5, 0.7, 0.9]), st.booleans()), min_size=1, max_size=600))
 def test_order_of_the_estimates_does_not_matter(pairs) -> None:
-    there = calibration_of(*map(np.array, zip(*pairs, strict=True)), "")
-    back = calibration_of(*map(np.array, zip(*reversed(pairs), strict=True)), "")
+    confidences, right = map(np.array, zip(*pairs, strict=True))
+    there = calibration_of(confidences, right, "")
+    back = calibration_of(confidences[::-1], right[::-1], "")
     assert acceptance(0.1, there) == acceptance(0.1, back)
 
 

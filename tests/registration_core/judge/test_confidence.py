@@ -24,7 +24,7 @@ CONFIG = SnapConfig().confidence
 
 
 def test_close_poses_are_one_mode() -> None:
-    apart = np.array([[0, 9, 1, 9], [9, 0, 9, 0], [1, 9, 0, 9], [9, 0, 9, 0]], np.float32) / 100
+    apart = np.array([[0, 9, 1, 9], [9, 0, 9, 0], [1, 9, 0, 9], [9, 0, 9, 0]], np.float32) / np.float32(100)
     np.testing.assert_array_equal(modes_of(apart, 0.07), [0, 1, 0, 1])
 
 

@@ -112,8 +112,9 @@ def plate_in_front_of(beyond, on_plane):
     depth = np.where(alone > 0, alone, np.float32(beyond))
     nowhere = np.zeros((200, 200), np.bool_)
     plane = np.array([0.0, 0.0, -1.0, beyond]) if on_plane else np.zeros(4)
+    fx, fy, cx, cy = map(f4, (200, 200, 99.5, 99.5))
     grid = Grid(
-        depth, np.zeros((3, 200, 200), np.float32), np.ones_like(depth), *map(f4, (200, 200, 99.5, 99.5)),
+        depth, np.zeros((3, 200, 200), np.float32), np.ones_like(depth), fx, fy, cx, cy,
         nowhere, (alone == 0) & on_plane, plane, np.zeros((0, 0), np.bool_),
     )  # fmt: skip
     return grid, viewpoint_model(plate)

@@ -9,9 +9,9 @@ from registration_core.paper.particle_filter import Noise, ParticleFilter, initi
 TARGET = pose.exp([0.03, -0.02, 0.5, 0.2, 0.0, -0.1])
 
 
-def bell(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+def bell(T_camera_centre: NDArray[np.float64]) -> NDArray[np.float64]:
     """Log-density of a Gaussian about TARGET, 5 mm and 0.05 rad wide."""
-    twists = np.stack([pose.log(pose.inverse(TARGET) @ T) for T in poses])
+    twists = np.stack([pose.log(pose.inverse(TARGET) @ T) for T in T_camera_centre])
     return -0.5 * ((twists / [0.005, 0.005, 0.005, 0.05, 0.05, 0.05]) ** 2).sum(axis=1)
 
 
@@ -44,7 +44,7 @@ def test_filter_finds_the_peak() -> None:
 
 def test_filter_without_any_evidence_keeps_its_particles_alive() -> None:
     poses = np.tile(TARGET, (10, 1, 1))
-    nothing = lambda T: np.full(len(T), -np.inf)  # noqa: E731
+    nothing = lambda T_camera_centre: np.full(len(T_camera_centre), -np.inf)  # noqa: E731
     particle_filter = ParticleFilter(nothing, Noise(0.0, 0.0), poses, np.random.default_rng(0))
     np.testing.assert_allclose(particle_filter.step().poses, poses, atol=1e-15)
 

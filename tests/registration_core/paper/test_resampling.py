@@ -1,5 +1,7 @@
 """Weights and systematic resampling."""
 
+from typing import cast
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -52,4 +54,4 @@ class Highest:
 @pytest.mark.parametrize("size", [3, 7, 10, 49, 625])
 def test_draw_beyond_a_sum_that_falls_short_of_one_stays_inside(size) -> None:
     weights = np.full(size, 1.0 / size) * (1.0 - 1e-12)
-    assert systematic(weights, Highest()).max() == size - 1
+    assert systematic(weights, cast(np.random.Generator, Highest())).max() == size - 1

@@ -2,6 +2,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -28,13 +29,14 @@ def renderer():
 
 def cast_depth(model: ObjectModel, T_camera_object: np.ndarray) -> np.ndarray:
     """Depth (H, W) by Open3D's ray casting, an independent answer."""
-    scene = o3d.t.geometry.RaycastingScene()
+    scene: Any = o3d.t.geometry.RaycastingScene()
+    tensor: Any = o3d.core.Tensor
     vertices = pose.apply(T_camera_object, model.vertices).astype(np.float32)
     scene.add_triangles(vertices, model.faces.astype(np.uint32))
     columns, rows = np.meshgrid(np.arange(CAMERA.width), np.arange(CAMERA.height))
     x, y = (columns - CAMERA.cx) / CAMERA.fx, (rows - CAMERA.cy) / CAMERA.fy
     rays = np.stack([*np.zeros((3, *x.shape)), x, y, np.ones_like(x)], axis=-1).astype(np.float32)
-    depth = scene.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()  # rays have z = 1, so t is the depth
+    depth = scene.cast_rays(tensor(rays))["t_hit"].numpy()  # rays have z = 1, so t is the depth
     return np.where(np.isfinite(depth), depth, 0.0)
 
 

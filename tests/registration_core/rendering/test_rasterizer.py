@@ -1,6 +1,7 @@
 """The z-buffer against Open3D's ray caster, and against what geometry says."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import open3d
@@ -17,7 +18,8 @@ CAMERA = Intrinsics(320, 240, 300.0, 310.0, 155.2, 121.7)
 
 def ray_cast(model: ObjectModel, camera: Intrinsics, T: NDArray[np.float64]) -> NDArray[np.float32]:
     """The same image by Open3D: z of the first hit of the ray through each pixel's centre."""
-    scene = open3d.t.geometry.RaycastingScene()
+    scene: Any = open3d.t.geometry.RaycastingScene()
+    tensor: Any = open3d.core.Tensor
     scene.add_triangles(
         pose.apply(T, model.vertices).astype(np.float32), np.asarray(model.faces, dtype=np.uint32)
     )
@@ -26,7 +28,7 @@ def ray_cast(model: ObjectModel, camera: Intrinsics, T: NDArray[np.float64]) -> 
         [(columns - camera.cx) / camera.fx, (rows - camera.cy) / camera.fy, np.ones(columns.shape)], axis=-1
     )
     rays = np.concatenate([np.zeros_like(directions), directions], axis=-1).astype(np.float32)
-    z = scene.cast_rays(open3d.core.Tensor(rays))["t_hit"].numpy()
+    z = scene.cast_rays(tensor(rays))["t_hit"].numpy()
     return np.where(np.isfinite(z), z, 0)
 
 

@@ -1,6 +1,7 @@
 """Symmetries of shapes that everybody knows, of scanned objects, and the laws that every suggestion obeys."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import open3d
@@ -113,10 +114,11 @@ def test_a_sphere_has_three_axes_at_right_angles() -> None:
 def misses(mesh: trimesh.Trimesh, transforms, count: int = 1500) -> np.ndarray:
     """Distances (K, count) of turned points of a mesh to it, computed on fresh samples."""
     points, _ = trimesh.sample.sample_surface(mesh, count, seed=99)
-    scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+    tensor: Any = open3d.core.Tensor
+    scene: Any = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(
-        open3d.core.Tensor(np.asarray(mesh.vertices, dtype=np.float32)),
-        open3d.core.Tensor(np.asarray(mesh.faces, dtype=np.uint32)),
+        tensor(np.asarray(mesh.vertices, dtype=np.float32)),
+        tensor(np.asarray(mesh.faces, dtype=np.uint32)),
     )
     return np.stack(
         [

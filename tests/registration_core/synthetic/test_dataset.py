@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from registration_core.bop.dataset import read_color, read_dataset, read_depth
+from registration_core.bop.dataset import BopGroundTruth, BopImage, read_color, read_dataset, read_depth
 from registration_core.geometry import pose
 from registration_core.geometry.camera import Intrinsics
 from registration_core.geometry.object_model import ObjectModel
@@ -46,20 +46,31 @@ def test_the_written_dataset_is_a_bop_dataset(written):
         assert len(known.model.symmetry_transforms) == len(source.model.symmetry_transforms)
     (scene,) = dataset.scenes
     assert len(scene.images) == 3
-    assert all(image.color is not None and len(image.ground_truth) == 5 for image in scene.images)
+    assert all(image.color is not None and len(truths(image)) == 5 for image in scene.images)
+
+
+def truths(image: BopImage) -> tuple[BopGroundTruth, ...]:
+    assert image.ground_truth is not None
+    return image.ground_truth
+
+
+def world_pose(image: BopImage, index: int) -> np.ndarray:
+    """`T_world_object` (4, 4) of one object in an image."""
+    assert image.T_world_camera is not None
+    return image.T_world_camera @ truths(image)[index].T_camera_object
 
 
 def test_true_poses_agree_between_views_and_with_depth(written):
     dataset = read_dataset(written)
     images = dataset.scenes[0].images
     for index, known in enumerate(dataset.objects):
-        in_world = [image.T_world_camera @ image.ground_truth[index].T_camera_object for image in images]
+        in_world = [world_pose(image, index) for image in images]
         assert in_world[1] == pytest.approx(in_world[0], abs=1e-9)
         assert in_world[2] == pytest.approx(in_world[0], abs=1e-9)
         errors = []
         for image in images:
             depth = read_depth(image.depth.path, image.depth_scale)
-            rendered = render_depth(known.model, image.camera, image.ground_truth[index].T_camera_object)
+            rendered = render_depth(known.model, image.camera, truths(image)[index].T_camera_object)
             seen = (rendered > 0) & (depth > 0) & (rendered < depth + 0.02)
             errors.append((depth - rendered)[seen])
         assert np.median(np.abs(np.concatenate(errors))) < 0.002
@@ -68,8 +79,9 @@ def test_true_poses_agree_between_views_and_with_depth(written):
 def test_pictures_show_the_objects_where_they_are(written):
     dataset = read_dataset(written)
     for image in dataset.scenes[0].images:
+        assert image.color is not None
         picture = read_color(image.color.path).astype(int)
-        T_camera_bowl = image.ground_truth[3].T_camera_object
+        T_camera_bowl = truths(image)[3].T_camera_object
         blue = (picture[..., 2] > picture[..., 0] + 40) & (picture[..., 2] > picture[..., 1] + 30)
         silhouette = render_depth(dataset.objects[3].model, image.camera, T_camera_bowl) > 0
         if (blue & silhouette).sum() > 100:

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -32,9 +34,10 @@ def seen_normals(known: ProceduralObject) -> tuple[np.ndarray, np.ndarray]:
     origins /= np.linalg.norm(origins, axis=1, keepdims=True)
     targets = known.mesh.triangles_center[rng.integers(len(known.mesh.faces), size=4000)]
     directions = targets - origins
-    scene = o3d.t.geometry.RaycastingScene()
+    scene: Any = o3d.t.geometry.RaycastingScene()
+    tensor: Any = o3d.core.Tensor
     scene.add_triangles(known.mesh.vertices.astype(np.float32), known.mesh.faces.astype(np.uint32))
-    hits = scene.cast_rays(o3d.core.Tensor(np.hstack([origins, directions]).astype(np.float32)))
+    hits = scene.cast_rays(tensor(np.hstack([origins, directions]).astype(np.float32)))
     hit = np.isfinite(hits["t_hit"].numpy())
     return directions[hit], hits["primitive_normals"].numpy()[hit]
 

@@ -1,5 +1,6 @@
 import dataclasses
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -47,8 +48,8 @@ def test_a_sensor_is_drawn_anew_for_each_image_except_for_the_demo():
 def test_a_sensor_is_json_and_back():
     sensor = draw_sensor(FAMILIES["active stereo"], np.random.default_rng(3))
     read = json.loads(json.dumps(dataclasses.asdict(sensor)))
-    again = Sensor(**{k: tuple(v) if isinstance(v, list) else v for k, v in read.items()})
-    assert again == sensor
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in read.items()}
+    assert Sensor(**values) == sensor
 
 
 @pytest.mark.parametrize("family", FULL, ids=list(FAMILIES))

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,7 @@ def wall(z: float) -> np.ndarray:
     return np.full((CAMERA.height, CAMERA.width), z, dtype=np.float32)
 
 
-def measured(depth: np.ndarray, **errors: float | tuple[float, float]) -> np.ndarray:
+def measured(depth: np.ndarray, **errors: Any) -> np.ndarray:
     """By a sensor that has these errors alone."""
     return measure(depth, CAMERA, np.random.default_rng(0), Sensor(**errors))
 
