@@ -18,6 +18,7 @@ from typing import Any
 
 import pytest
 import yaml
+from typer.core import TyperGroup
 from typer.main import get_command
 
 from app.api import health
@@ -257,7 +258,9 @@ def assert_is_a_command(command: list[str]) -> None:
         (found,) = entry_points(group="dask_cli", name=subcommand)
         found.load().make_context(subcommand, arguments)
     else:
-        get_command(cli).commands[subcommand].make_context(subcommand, arguments)
+        group = get_command(cli)
+        assert isinstance(group, TyperGroup)
+        group.commands[subcommand].make_context(subcommand, arguments)
 
 
 def free_port() -> int:

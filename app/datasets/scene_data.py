@@ -141,7 +141,7 @@ def camera_of(frame: Frame) -> Intrinsics:
     return Intrinsics(frame.width, frame.height, frame.fx, frame.fy, frame.cx, frame.cy)
 
 
-def symmetries_to_json(symmetries: Symmetries) -> dict[str, object]:
+def symmetries_to_json(symmetries: Symmetries) -> dict[str, list[object]]:
     """Symmetries as they are kept in the database: metres, in the mesh's frame."""
     return {
         "discrete": [[list(row) for row in T] for T in symmetries.discrete],

@@ -7,6 +7,7 @@ import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from subprocess import CompletedProcess
+from typing import cast
 
 import dask
 import httpx
@@ -186,7 +187,7 @@ def snap6d(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) 
             with pytest.raises(SystemExit) as ended:
                 app.cli.commands.main()
                 raise SystemExit(0)
-        return CompletedProcess(arguments, ended.value.code or 0, *capsys.readouterr())
+        return CompletedProcess(arguments, cast(int, ended.value.code or 0), *capsys.readouterr())
 
     return run
 

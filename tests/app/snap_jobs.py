@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
+from typing import Any
 
 import numpy as np
 
@@ -36,11 +37,9 @@ def view_of(depth: np.ndarray, camera: Intrinsics) -> JobView:
     return JobView(depth, camera, np.eye(4), None, None)
 
 
-def new_job(
-    model: ObjectModel, topic: str = "", config: SnapConfig | None = None, **changes: object
-) -> SnapJob:
+def new_job(model: ObjectModel, topic: str = "", config: SnapConfig | None = None, **changes: Any) -> SnapJob:
     """A snap of the tool from nearby."""
-    fields = {
+    fields: dict[str, Any] = {
         "snap_id": uuid.uuid4().hex,
         "topic": topic,
         "model_hash": model.content_hash,

@@ -191,7 +191,10 @@ def test_all_that_a_page_names_is_there(live: LiveServer, page) -> None:
     assert len(parsed.ids) == len(set(parsed.ids))
     client: httpx.Client = live.person("a reader of pages")
     named = {
-        attributes[name] for _, attributes in parsed.tags for name in ("src", "href") if attributes.get(name)
+        address
+        for _, attributes in parsed.tags
+        for name, address in attributes.items()
+        if name in ("src", "href") and address
     }
     for address in named:
         parts = urlsplit(address)

@@ -11,7 +11,12 @@ from tests.app.waiting import LONGEST
 
 def test_the_last_results_are_kept() -> None:
     asked: list[int] = []
-    squares = Recent(2, lambda number: asked.append(number) or number**2)
+
+    def square(number: int) -> int:
+        asked.append(number)
+        return number * number
+
+    squares = Recent(2, square)
     assert [squares(number) for number in (1, 2, 1, 3, 1, 2)] == [1, 4, 1, 9, 1, 4]
     assert asked == [1, 2, 3, 2]
 

@@ -10,7 +10,7 @@ LONGEST = 60.0
 """Seconds; far more than anything here takes, for slow machines."""
 
 
-def wait_until(look: Callable[[], T], what: str, seconds: float = LONGEST) -> T:
+def wait_until(look: Callable[[], T | None], what: str, seconds: float = LONGEST) -> T:
     """What `look` returns, as soon as it is true; fails where that takes too long."""
     deadline = time.monotonic() + seconds
     while True:

@@ -4,6 +4,7 @@ import base64
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import PIL.Image
@@ -158,8 +159,8 @@ def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     labelling, page = image.labelling, image.page
     assert page.request.post(f"{labelling.url}/reset").ok
     wait_for_picture(labelling.frame)
-    expected = image.silhouette(np.array(labelling.state["T_camera_object"])).nonzero()
-    wait_until(lambda: np.linalg.norm(image.place - np.mean(expected, axis=1)[::-1]) < 5, "the start pose")
+    first = image.silhouette(np.array(labelling.state["T_camera_object"])).nonzero()
+    wait_until(lambda: np.linalg.norm(image.place - np.mean(first, axis=1)[::-1]) < 5, "the start pose")
     before = image.place
     start, end = labelling.take_hold("tz", 0.08)
     for share in (0.3, 0.6, 1.0):
@@ -181,11 +182,15 @@ def test_blend_goes_from_the_outline_alone_to_the_shape(image: Image) -> None:
     rows, columns = np.nonzero(wide)
     inside = (int(rows.mean()) + 30, int(columns.mean()))
     assert wide[inside]
+
+    def is_about(alpha: int) -> bool:
+        return abs(int(image.pixels[inside][3]) - alpha) <= 2
+
     seen = []
     for share in (0.0, 0.5, 1.0):
         image.blend(share)
         wanted = round(255 * share)
-        wait_until(lambda wanted=wanted: abs(int(image.pixels[inside][3]) - wanted) <= 2, f"blend {share}")
+        wait_until(partial(is_about, wanted), f"blend {share}")
         seen.append((image.pixels[..., 3] > COVERED).sum())
         take_picture(image.page, f"label-outline-blend-{share}")
     assert 100 < seen[0] < 0.2 * wide.sum() < seen[2]

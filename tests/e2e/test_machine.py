@@ -45,7 +45,9 @@ def calibrated(server: Server) -> Iterator[None]:
         gains={},
     )
     with database.write() as session:
-        taught.dataset_id = session.scalars(select(Dataset.id)).first()
+        dataset_id = session.scalars(select(Dataset.id)).first()
+        assert dataset_id is not None
+        taught.dataset_id = dataset_id
         session.add(taught)
     yield
     with database.write() as session:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.storage.tables import Condition
 from tests.e2e.conftest import take_picture
 from tests.e2e.labelling_page import LabellingPage
 from tests.e2e.test_machine import Open, open_labelling
@@ -46,7 +47,7 @@ def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_labelling: Op
 
 @pytest.mark.parametrize("condition", ["paper snap", "live snap", "manual"])
 def test_where_the_condition_fixes_the_method_there_is_no_choice(
-    server: Server, open_page: Callable[[str], Page], condition: str
+    server: Server, open_page: Callable[[str], Page], condition: Condition
 ) -> None:
     labelling = LabellingPage(
         open_page(server.new_link(f"fixed {condition}", "admin")), server, "box", condition

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import ConsoleMessage, Page, Route, expect
+from playwright.sync_api import ConsoleMessage, Page, Route, ViewportSize, expect
 
 from tests.conftest import REPOSITORY
 from tests.e2e.conftest import take_picture
@@ -17,7 +17,8 @@ from tests.processes import Server, serving
 pytestmark = pytest.mark.e2e
 
 PAGES = {"Home": "/", "Team": "/report/team", "Studies": "/studies", "Export": "/export"}
-WIDE, PHONE = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
+WIDE: ViewportSize = {"width": 1366, "height": 768}
+PHONE: ViewportSize = {"width": 390, "height": 844}
 LONG = "x-" * 59
 """As long as a name may be and more than any line holds: 118 characters."""
 IS_TOO_WIDE = "selector => document.querySelector(selector).scrollWidth > innerWidth"

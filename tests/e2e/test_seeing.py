@@ -4,6 +4,7 @@ the outline is redrawn in a drag.
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -90,6 +91,10 @@ def dominant(image: Image) -> str:
     return max(unit, key=lambda name: float(unit[name] @ seen))
 
 
+def is_dominant(image: Image, verdict: str) -> bool:
+    return dominant(image) == verdict
+
+
 def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
     labelling, page = image.labelling, image.page
     T_world_camera = np.array(image.frames[0]["T_world_camera"])
@@ -105,7 +110,7 @@ def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
     page.keyboard.press("z")
     for T, verdict in ((truth, "match"), (NEARER @ truth, "in_front"), (FARTHER @ truth, "behind")):
         image.put(T)
-        wait_until(lambda verdict=verdict: dominant(image) == verdict, f"the colour of {verdict}", 40)
+        wait_until(partial(is_dominant, image, verdict), f"the colour of {verdict}", 40)
         shown = labelling.state["agreement"][verdict]
         row = page.locator(f"[data-verdict={verdict}] output")
         expect(row).to_have_text(f"{100 * shown:.0f} %")

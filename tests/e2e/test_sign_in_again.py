@@ -1,6 +1,7 @@
 """A login that ends in the middle of the work: sign in again in place, and go on."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ def end_login(labelling: LabellingPage) -> None:
     The 3-D view loses its connection with it, and gets another one once somebody is signed in again.
     """
     expect_new_view(labelling.frame)
-    cookies = labelling.page.context.cookies()
+    cookies: Any = labelling.page.context.cookies()  # playwright takes another type than it gives
     assert labelling.page.request.post(f"{labelling.root}/api/sign-out").ok
     labelling.page.context.add_cookies(cookies)
 

@@ -3,6 +3,7 @@
 import itertools
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import open3d
@@ -78,7 +79,8 @@ class ObjectView:
 
 def well_seen(*eyes: Array) -> Array:
     """Points of the object (N, 3), in its frame, that none of the eyes (3,) there sees at a grazing angle."""
-    rays = open3d.t.geometry.RaycastingScene()
+    rays: Any = open3d.t.geometry.RaycastingScene()
+    tensor: Any = open3d.core.Tensor  # whose stubs know no arrays
     rays.add_triangles(MODEL.vertices.astype(np.float32), MODEL.faces.astype(np.uint32))
     corners = MODEL.vertices[MODEL.faces]
     points = corners.mean(axis=1)
@@ -89,7 +91,7 @@ def well_seen(*eyes: Array) -> Array:
         towards = points - eye
         far = np.linalg.norm(towards, axis=1)
         lines = np.hstack([np.broadcast_to(eye, points.shape), towards / far[:, None]]).astype(np.float32)
-        hit = rays.cast_rays(open3d.core.Tensor(lines))["t_hit"].numpy()
+        hit = rays.cast_rays(tensor(lines))["t_hit"].numpy()
         seen &= (np.abs(hit - far) < 1e-4) & (np.abs((normals * towards).sum(axis=1)) > 0.5 * far)
     return points[seen]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -27,7 +28,7 @@ def open_again(page: Page, link: str) -> Page:
 
 def end_login(page: Page, server: Server) -> None:
     """The cookie stays with the browser, as it does when a login expires; the server knows it no more."""
-    cookies = page.context.cookies()
+    cookies: Any = page.context.cookies()  # playwright takes another type than it gives
     assert page.request.post(f"{server.url}/api/sign-out").ok
     page.context.add_cookies(cookies)
 

@@ -100,7 +100,9 @@ def _run_step(image: Image, step: Instruction) -> None:
             image.folder = step.value
             (image.root / step.value.lstrip("/")).mkdir(parents=True, exist_ok=True)
         case "ENV":
-            image.environment.update(part.split("=", 1) for part in shlex.split(step.value))
+            for part in shlex.split(step.value):
+                name, value = part.split("=", 1)
+                image.environment[name] = value
         case "USER":
             image.user = step.value
 

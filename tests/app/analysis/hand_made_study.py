@@ -100,7 +100,7 @@ class HandMadeStudy:
     def snaps(
         self,
         registration_id: int,
-        results: dict[float, np.ndarray | None],
+        results: Mapping[float, np.ndarray | None],
         algorithm: str | None = ALGORITHM,
         method: str = "default",
     ) -> None:
@@ -225,7 +225,7 @@ def event_of(registration: Registration, sequence: int, entry: Entry) -> Event:
     )
 
 
-def two_moves(half_way: float, end: np.ndarray, T_end: np.ndarray) -> list[Entry]:
+def two_moves(half_way: float, end: float, T_end: np.ndarray) -> list[Entry]:
     """Seen after 1 s; moved to 0.05 m at `half_way`, to the end pose at `end`, and submitted there."""
     return [
         Entry(0.0, "opened"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from app.analysis.study_data.trial import Snapped, TrialTrace
 from app.analysis.trace.pose_errors import PoseErrors
+from app.storage.tables import Method
 
 NAN = float("nan")
 
@@ -28,8 +29,12 @@ def trial(
 ) -> TrialTrace:
     """Errors in metres and radians, half a second apart; all idle time is at the start."""
     count = len(translation)
-    seconds = 0.5 * np.arange(count)
+    seconds = 0.5 * np.arange(count, dtype=np.float64)
     none = [NAN] * count
+    snaps: tuple[tuple[Method, Sequence[float] | None, Sequence[float] | None], ...] = (
+        ("default", stg_translation, stg_rotation),
+        ("paper", paper_translation, paper_rotation),
+    )
 
     def errors(*kinds: Sequence[float] | None) -> PoseErrors:
         return PoseErrors(*(np.array(kind if kind is not None else none, dtype=float) for kind in kinds))
@@ -50,10 +55,7 @@ def trial(
         errors=errors(translation, rotation if rotation is not None else [0.0] * count),
         stg={
             method: Snapped(errors(shifts, turns if turns is not None else shifts), np.ones(count, bool))
-            for method, shifts, turns in (
-                ("default", stg_translation, stg_rotation),
-                ("paper", paper_translation, paper_rotation),
-            )
+            for method, shifts, turns in snaps
             if shifts is not None
         },
     )

@@ -3,8 +3,9 @@
 import io
 import threading
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import httpx
 import pytest
@@ -43,7 +44,7 @@ def upload(client: httpx.Client, content: bytes, name: str = "tools.zip") -> htt
     return client.post("/api/datasets", files={"file": (name, content, "application/zip")})
 
 
-def rows_of(server: LiveServer) -> dict[str, list]:
+def rows_of(server: LiveServer) -> dict[str, Sequence[Any]]:
     with server.services.database.read() as session:
         return {table: session.execute(text(f"SELECT * FROM {table} ORDER BY id")).all() for table in TABLES}
 

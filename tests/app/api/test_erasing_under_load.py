@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from threading import Event as Signal
 from typing import Any
 
@@ -61,6 +62,11 @@ def rows_of(server: LiveServer, user_id: int) -> int:
         return sum(session.scalar(count) or 0 for count in counts)
 
 
+def has_begun(server: LiveServer, user_id: int) -> bool:
+    """Whether there is enough of a user's work to erase."""
+    return rows_of(server, user_id) > 10
+
+
 def test_nothing_of_the_erased_is_left_and_nobody_else_is_disturbed(own_live: LiveServer) -> None:
     chief = own_live.script("chief", Role.ADMIN)
     ann = own_live.script("ann")
@@ -77,7 +83,7 @@ def test_nothing_of_the_erased_is_left_and_nobody_else_is_disturbed(own_live: Li
                 participant = take_part(own_live, invited["link"])
                 export = pool.submit(finished_export, chief)
                 theirs = pool.submit(at_work, stop, hand_of(participant, begin_next(participant)))
-                wait_until(lambda user_id=user_id: rows_of(own_live, user_id) > 10, "them to be at work")
+                wait_until(partial(has_begun, own_live, user_id), "them to be at work")
                 erased = chief.delete(f"/api/studies/{study['id']}/participants/{invited['id']}")
                 assert erased.status_code == 204
                 wrong = [answer for answer in theirs.result() if answer.status_code not in OK | SHUT_OUT]

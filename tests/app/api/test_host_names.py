@@ -8,6 +8,7 @@ import httpx
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
+from websockets.typing import Origin
 
 from app.access.throttle import FREE_ATTEMPTS
 from app.api.host_names import host_name, own_names
@@ -37,11 +38,12 @@ def test_a_name_that_leads_here_by_somebody_elses_will_is_refused(
 
 
 def test_a_websocket_under_such_a_name_is_refused(live: LiveServer) -> None:
+    origin = Origin("http://evil.example")
     with (
         socket.create_connection(("127.0.0.1", live.port)) as opened,
         pytest.raises(InvalidStatus) as refused,
     ):
-        connect("ws://evil.example/view/1/", sock=opened, origin="http://evil.example", proxy=None)
+        connect("ws://evil.example/view/1/", sock=opened, origin=origin, proxy=None)
     assert refused.value.response.status_code == 403
 
 

@@ -9,6 +9,7 @@ from typing import Any, cast
 import httpx
 import pytest
 import schemathesis
+import schemathesis.specs.openapi
 from hypothesis import HealthCheck, Phase, given, settings
 from schemathesis.checks import not_a_server_error
 from schemathesis.specs.openapi.checks import (

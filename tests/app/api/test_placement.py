@@ -44,6 +44,14 @@ def open_view(live: LiveServer, live_session: LiveSession) -> ViserClient:
     return client
 
 
+def camera_pose(live_session: LiveSession) -> np.ndarray:
+    """T_world_camera of the page."""
+    assert live_session.view is not None
+    viewpoint = live_session.view.viewpoint
+    assert viewpoint is not None
+    return viewpoint.T_world_camera
+
+
 def seen_from_the_corner(client: ViserClient) -> None:
     """What a browser sends when its camera has found its place; viser turns (w, x, y, z) into axes."""
     z = -np.ones(3) / np.sqrt(3)
@@ -89,14 +97,12 @@ def test_the_views_axes_are_those_of_the_open_page(
     with open_view(live, live_session) as client:
         seen_from_the_corner(client)
         away = -np.ones(3) / np.sqrt(3)
-        wait_until(
-            lambda: np.allclose(live_session.view.viewpoint.T_world_camera[:3, 2], away), "the camera's place"
-        )
+        wait_until(lambda: np.allclose(camera_pose(live_session)[:3, 2], away), "the camera's place")
         moved = shown(post(script, registration, "nudge", axes="view", translation=[0, 0, 0.01]))
     assert moved[:3, 3] - T[:3, 3] == pytest.approx(0.01 * away)
 
 
-BAD_NUDGES = {
+BAD_NUDGES: dict[str, dict[str, Any]] = {
     "axes": {"axes": "mine"},
     "translation": {"axes": "world", "translation": [0, 0, 1e9]},
     "rotation": {"axes": "world", "rotation": [0, 0]},
@@ -160,8 +166,8 @@ def test_a_click_on_the_table_in_the_view_lets_it_stand_there(
     live_session = live.live_session(registration["id"])
     with open_view(live, live_session) as client:
         seen_from_the_corner(client)
-        wait_until(lambda: live_session.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
-        x, y, z = pose.apply(pose.inverse(live_session.view.viewpoint.T_world_camera), [0.12, -0.1, 0.0])
+        wait_until(lambda: camera_pose(live_session)[2, 2] < 0, "the camera's place")
+        x, y, z = pose.apply(pose.inverse(camera_pose(live_session)), [0.12, -0.1, 0.0])
         half = np.tan(VISER_CAMERA["fov"] / 2)
         across, down = 0.5 + x / z / half * 600 / 800 / 2, 0.5 + y / z / half / 2
         placed = shown(post(script, registration, "place", across=across, down=down))
@@ -196,7 +202,7 @@ def test_the_view_looks_from_elsewhere_and_nothing_is_logged(
     logged = log_of(script, registration["id"])
     with open_view(live, live_session) as client:
         seen_from_the_corner(client)
-        wait_until(lambda: live_session.view.viewpoint.T_world_camera[2, 2] < 0, "the camera's place")
+        wait_until(lambda: camera_pose(live_session)[2, 2] < 0, "the camera's place")
         assert post(script, registration, "look", at=at).status_code == 204
         position = np.array(
             client.wait_for("SetCameraPositionMessage", lambda m: not m["initial"])["position"]

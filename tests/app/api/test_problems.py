@@ -1,6 +1,6 @@
 """What goes wrong is said in one sentence of `application/problem+json`, and has changed nothing."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -47,7 +47,7 @@ def until_full(write: Callable[[int], httpx.Response]) -> int:
     raise AssertionError("the disk is not full")
 
 
-def rows_of(server: LiveServer) -> list[list[Any]]:
+def rows_of(server: LiveServer) -> list[Sequence[Any]]:
     tables = ("users", "credentials", "datasets", "tasks", "registrations", "events", "estimates", "exports")
     with server.services.database.read() as session:
         return [session.execute(text(f"SELECT * FROM {table}")).all() for table in tables]
@@ -65,7 +65,7 @@ def test_on_a_full_disk_nothing_changes_and_all_goes_on_when_there_is_room(own_l
         state = script.get(url).json()
         expected = moved(saved - 1) if saved else registration
         assert np.allclose(state["T_world_object"], expected["T_world_object"])
-        calls = [("PUT", f"{url}/pose", moved(99))]
+        calls: list[tuple[str, str, dict[str, Any] | None]] = [("PUT", f"{url}/pose", moved(99))]
         calls += [("POST", f"{url}/{action}", None) for action in ("reset", "submit", "snaps")]
         for method, address, body in calls:
             assert sentence(script.request(method, address, json=body), 507) == DISK_FULL

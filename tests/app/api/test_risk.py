@@ -44,7 +44,7 @@ def test_a_lead_sets_the_risk_and_takes_it_back(operator: httpx.Client, reviewer
 
 
 @pytest.mark.parametrize("risk", [0, 1, -0.1, 1e-5, "much"])
-def test_a_risk_that_is_no_share_is_refused(reviewer: httpx.Client, risk: object) -> None:
+def test_a_risk_that_is_no_share_is_refused(reviewer: httpx.Client, risk: float | str) -> None:
     assert "risk" in sentence(reviewer.put("/api/datasets/1/risk", json={"risk": risk}), 422)
     assert "risk" in sentence(reviewer.get("/api/datasets/1/acceptance", params={"risk": risk}), 422)
 

@@ -1,5 +1,7 @@
 """Searches by REST on real workers: the same candidates as the library's, and how they end."""
 
+from typing import Any
+
 import httpx
 import numpy as np
 import pytest
@@ -109,7 +111,7 @@ def test_uncertainty_is_told_of_a_snapped_pose_alone_and_after_a_restart(
 ) -> None:
     near = pose.perturbed(true_pose(TOOL), 0.012, np.radians(10), np.random.default_rng(3))
     operator.put(f"{url}/pose", json={"T_world_object": near.tolist()})
-    nothing = {"snap_id": None, "translation": None, "rotation": None, "unknown": []}
+    nothing: dict[str, Any] = {"snap_id": None, "translation": None, "rotation": None, "unknown": []}
     assert operator.get(f"{url}/uncertainty").json() == nothing
     snap_id = operator.post(f"{url}/snaps", json={"seed": 1}).json()["id"]
     estimate = finished_snap(operator, snap_id)["estimate"]

@@ -8,6 +8,7 @@ import httpx
 import numpy as np
 import pytest
 
+from app.storage.roles import Role
 from registration_core.geometry import pose
 from tests.app.live import LiveServer
 from tests.app.rest import begin, finished_snap, put_pose, sentence
@@ -50,7 +51,7 @@ def test_an_object_tells_its_size_and_suggestions(operator: httpx.Client) -> Non
 
 
 def test_open_suggestions_are_easy_to_find(own_live: LiveServer, block: dict[str, Any]) -> None:
-    lead = own_live.person("lea", "admin")
+    lead = own_live.person("lea", Role.ADMIN)
     url = "/api/objects?suggestions_open=true"
     assert [item["id"] for item in lead.get(url).json()["items"]] == [block["id"]]
     assert lead.get("/api/datasets/1").json()["suggestions_open"] == 1
@@ -61,7 +62,7 @@ def test_open_suggestions_are_easy_to_find(own_live: LiveServer, block: dict[str
 
 def test_only_a_lead_decides_and_everybody_may_look(own_live: LiveServer, block: dict[str, Any]) -> None:
     url = f"/api/objects/{block['id']}/symmetries"
-    for name, role in (("olga", "operator"), ("rita", "reviewer")):
+    for name, role in (("olga", Role.OPERATOR), ("rita", Role.REVIEWER)):
         client = own_live.person(name, role)
         assert "needs the role admin" in sentence(put(client, block, {"axes": []}), 403)
         (version,) = client.get(url).json()
@@ -71,7 +72,7 @@ def test_only_a_lead_decides_and_everybody_may_look(own_live: LiveServer, block:
 
 
 def test_decisions_are_versions_that_can_be_taken_back(own_live: LiveServer, block: dict[str, Any]) -> None:
-    lead = own_live.person("lea", "admin")
+    lead = own_live.person("lea", Role.ADMIN)
     accepted = decided(lead, block, {"axes": block["suggestions"][:2], "version": 1})
     assert (accepted["symmetries_version"], accepted["undo_version"]) == (2, 1)
     assert len(accepted["symmetries"]["discrete"]) == 7
@@ -119,7 +120,7 @@ def test_what_cannot_be_is_refused_in_a_sentence(
 
 
 def test_tiny_and_huge_directions_are_directions(own_live: LiveServer, block: dict[str, Any]) -> None:
-    lead = own_live.person("lea", "admin")
+    lead = own_live.person("lea", Role.ADMIN)
     for length in (1e-300, 1e8):
         (axis,) = decided(lead, block, {"axes": [UP | {"axis": [0, 0, length]}]})["axes"]
         assert axis["axis"] == [0, 0, 1]
@@ -128,7 +129,7 @@ def test_tiny_and_huge_directions_are_directions(own_live: LiveServer, block: di
 def test_the_next_snap_of_an_open_session_uses_what_was_decided(
     own_live: LiveServer, block: dict[str, Any]
 ) -> None:
-    lead, robot = own_live.person("lea", "admin"), own_live.script("robot")
+    lead, robot = own_live.person("lea", Role.ADMIN), own_live.script("robot")
     registration = begin(robot, task=1)
     url = f"/api/registrations/{registration['id']}"
     assert registration["symmetries_version"] == 1

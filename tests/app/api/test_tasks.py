@@ -16,11 +16,11 @@ from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 
 
-def items(client: httpx.Client, **query: object) -> list[dict]:
+def items(client: httpx.Client, **query: int | str) -> list[dict]:
     return client.get("/api/tasks", params=query).json()["items"]
 
 
-def ids(client: httpx.Client, **query: object) -> list[int]:
+def ids(client: httpx.Client, **query: int | str) -> list[int]:
     return [task["id"] for task in items(client, **query)]
 
 
@@ -127,7 +127,7 @@ def test_the_next_task_stays_among_those_that_are_asked_for(own_live: LiveServer
     other = import_dataset(services.database, services.files, demo, "others").dataset_id
     ann, bob = own_live.script("ann"), own_live.script("bob")
 
-    def next_of(client: httpx.Client, **query: object) -> int:
+    def next_of(client: httpx.Client, **query: int | str) -> int:
         return client.get("/api/tasks/next", params=query).json()["id"]
 
     there = ids(ann, dataset_id=other)

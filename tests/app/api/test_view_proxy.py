@@ -1,6 +1,8 @@
 """The door to the views: for the owner, from our own pages, and for nobody else."""
 
 import threading
+from functools import partial
+from typing import Any
 
 import httpx
 import numpy as np
@@ -178,6 +180,12 @@ def test_a_drag_is_in_the_log_with_its_freedom_and_its_way(live):
     assert np.allclose(state["T_world_object"], event["T_after"]) and state["can_undo"]
 
 
+def log_of_five_drags(operator: Operator) -> list[dict[str, Any]] | None:
+    """The whole log, once it has as many."""
+    found = log_of(operator.http, operator.id)
+    return found if len(found) == 6 else None
+
+
 def test_each_users_drags_are_in_their_own_log_only(live):
     two = [Operator(live, f"{name} of the proxy") for name in ("eva", "finn")]
     with two[0].view() as first, two[1].view() as second:
@@ -187,12 +195,7 @@ def test_each_users_drags_are_in_their_own_log_only(live):
                 T[:3, 3] += 0.01 * (i + 1) * T[:3, axis]
                 view.drag([T])
         for operator, freedom in zip(two, ("tx", "tz"), strict=True):
-            events = wait_until(
-                lambda operator=operator: (
-                    found if len(found := log_of(operator.http, operator.id)) == 6 else None
-                ),
-                "five drags",
-            )
+            events = wait_until(partial(log_of_five_drags, operator), "five drags")
             assert [event["dof"] for event in events[1:]] == [[freedom]] * 5
 
 

@@ -229,6 +229,26 @@ def large_depth(root: Path) -> None:
     Image.fromarray(raw).save((root / DEPTH).with_suffix(".tif"))
 
 
+def images_one_by_one(root: Path) -> None:
+    shutil.rmtree(root / "test")
+    twice(MESH, "val/000000_000000.camera.json")(root)
+
+
+def packed_scenes(root: Path) -> None:
+    shutil.rmtree(root / "test")
+    (root / "test.zip").write_bytes(b"PK")
+
+
+def with_depth_scale(scale: float) -> Change:
+    """In every image of every scene."""
+
+    def change(root: Path) -> None:
+        for path in root.rglob("scene_camera.json"):
+            change_json(path, lambda c: [entry.update(depth_scale=scale) for entry in c.values()])
+
+    return change
+
+
 REFUSED: dict[str, tuple[Change, list[str]]] = {
     "one scene under two names": (twice(POSED_SCENE, "test/1"), ["test/000001", "test/1", "one scene"]),
     "one object under two names": (twice(MESH, f"models/obj_{BLOCK}.ply"), [f"both object {BLOCK}"]),
@@ -257,7 +277,7 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
     "a split's name of 60 characters": (renamed("test", "t" * 60), ["50 readable"]),
     "meshes of another suffix": (renamed("models", "models_fine"), ["models has no mesh", "models_fine"]),
     "images one by one": (
-        lambda root: (shutil.rmtree(root / "test"), twice(MESH, "val/000000_000000.camera.json")(root)),
+        images_one_by_one,
         ["no scene", "val", "single images"],
     ),
     "files by sensor": (
@@ -268,14 +288,11 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
         [POSED_SCENE, "scene_camera_photoneo.json", "_photoneo"],
     ),
     "packed scenes": (
-        lambda root: (shutil.rmtree(root / "test"), (root / "test.zip").write_bytes(b"PK")),
+        packed_scenes,
         ["no scene", "unpack test.zip"],
     ),
     "depth in micrometres": (
-        lambda root: [
-            change_json(path, lambda c: [entry.update(depth_scale=1e-4) for entry in c.values()])
-            for path in root.rglob("scene_camera.json")
-        ],
+        with_depth_scale(1e-4),
         ["depth_scale 0.0001", "import with depth scale"],
     ),
 }
@@ -328,10 +345,7 @@ ODD: dict[str, tuple[Change, list[str]]] = {
         ["focal lengths (4, 4 pixels)", "image 5"],
     ),
     "depth ten times too near": (
-        lambda root: [
-            change_json(path, lambda c: [entry.update(depth_scale=0.01) for entry in c.values()])
-            for path in root.rglob("scene_camera.json")
-        ],
+        with_depth_scale(0.01),
         ["far behind what the depth image shows", "depth_scale"],
     ),
     "a picture that is missing": (

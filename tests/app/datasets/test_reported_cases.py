@@ -124,7 +124,7 @@ def test_every_mesh_is_exported_in_a_form_that_all_tools_read(shared_cases, tmp_
     assert {line.split()[1] for line in lines if line.startswith("property")} <= {"float", "uchar", "list"}
     mesh = trimesh.load(folder / "models/obj_000001.ply", process=False)
     assert len(mesh.faces) == 36
-    assert np.allclose(mesh.bounds, [np.negative(EXTENTS), EXTENTS])
+    assert np.allclose(mesh.bounds, np.array([np.negative(EXTENTS), EXTENTS]))
 
 
 def test_a_texture_comes_along(shared_cases, tmp_path):

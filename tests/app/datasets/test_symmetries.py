@@ -121,6 +121,7 @@ def test_accepting_makes_a_version_of_the_closed_group(session: Session, files: 
     assert block.symmetries_version == 2 and not block.suggestions_open
     assert count(session, block) == 8
     newest, first = versions_of(session, block.id)
+    assert newest.user is not None
     assert (newest.version, newest.user.name) == (2, "lea") and first.version == 1
     assert [axis["fold"] for axis in present_axes(session, block)] == [4, 2]
 
@@ -188,7 +189,7 @@ def test_a_refused_decision_changes_nothing(session: Session, files: FileStore, 
 
 
 def test_versions_can_only_be_added(imported: Database) -> None:
-    nothing = {"discrete": [], "continuous": []}
+    nothing: dict[str, list[object]] = {"discrete": [], "continuous": []}
     for statement in (update(SymmetryVersion).values(symmetries=nothing), delete(SymmetryVersion)):
         with pytest.raises(DBAPIError, match="append-only"), imported.write() as session:
             session.execute(statement)

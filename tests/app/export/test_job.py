@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +115,7 @@ def test_a_job_ends_with_a_stored_zip(site: Site) -> None:
     row = row_of(site, export_id)
     assert (row.state, row.progress) == ("done", 1.0)
     assert row.message == "Scenes: 2, images: 7, annotated objects: 6."
+    assert row.file_hash is not None
     with zipfile.ZipFile(site.files.path(row.file_hash)) as zipped:
         assert zipped.testzip() is None
         gt = json.loads(zipped.read("Two_boxes_v1/test/000002/scene_gt.json"))
@@ -137,7 +138,9 @@ def test_equal_exports_are_stored_once(site: Site) -> None:
         (submit_floating, "test/000001, image 0, object 3 (entry 0): the surface in this pose is"),
     ],
 )
-def test_a_failed_job_says_why_and_serves_nothing(site: Site, prepare: object, message: str) -> None:
+def test_a_failed_job_says_why_and_serves_nothing(
+    site: Site, prepare: Callable[[Site], None], message: str
+) -> None:
     prepare(site)
     export_id = request(site)
     stored = sorted(site.files.root.rglob("*"))

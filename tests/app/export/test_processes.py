@@ -86,6 +86,7 @@ def test_an_export_ends_with_a_zip_in_the_store(jobs, database, settings):
     assert (export.state, export.progress, export.file_hash) == ("queued", 0.0, None)
     done = ended(database, export)
     assert (done.state, done.progress) == ("done", 1.0), done.message
+    assert done.file_hash is not None
     with zipfile.ZipFile(FileStore(settings.files_dir).path(done.file_hash)) as archive:
         assert archive.testzip() is None
         assert any(name.endswith("scene_gt.json") for name in archive.namelist())

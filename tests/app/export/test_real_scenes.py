@@ -19,6 +19,7 @@ def test_official_poses_come_back(name: str, tolerance: float, shared_data: Path
     wanted, found = source.scenes[0], exported.scenes[0]
     assert [image.image_id for image in found.images] == [image.image_id for image in wanted.images]
     for there, here in zip(wanted.images, found.images, strict=True):
+        assert here.ground_truth is not None and there.ground_truth is not None
         assert [truth.obj_id for truth in here.ground_truth] == [truth.obj_id for truth in there.ground_truth]
         for official, truth in zip(there.ground_truth, here.ground_truth, strict=True):
             distance = pose.distance(official.T_camera_object, truth.T_camera_object)

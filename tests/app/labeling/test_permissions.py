@@ -9,6 +9,7 @@ from app.labeling.layers import Layers
 from app.labeling.moves.pose_record import ActionError
 from app.labeling.permissions import ALL, COMPARED, MACHINES, methods_of, require, tools_of
 from app.storage.roles import Actor
+from app.storage.tables import Condition
 from tests.app.labeling.bench import START, Bench, result
 
 T_ELSEWHERE = START + np.eye(4, k=3)
@@ -56,7 +57,8 @@ def test_a_bare_pose_is_refused_in_a_trial():
 
 
 def test_the_machine_takes_its_turn_in_a_trial_with_auto_alone():
-    for condition, turns in (("auto", 1), ("snap", 0)):
+    turns_of: dict[Condition, int] = {"auto": 1, "snap": 0}
+    for condition, turns in turns_of.items():
         bench = Bench(condition=condition, in_study=True)
         bench.drag(T_ELSEWHERE)
         assert len(bench.workers.snaps) == turns

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.labeling.layers import Layers
+from app.labeling.moves.camera_watch import Camera
 from app.labeling.moves.pose_record import ActionError
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
@@ -43,8 +44,14 @@ def test_what_the_view_shows_is_chosen_at_any_time_and_is_no_event(bench):
 # -- record first
 
 
+def drag(session: LabelingSession) -> None:
+    session.start_drag()
+    session.drag_to(shifted(0.1))
+    session.end_drag()
+
+
 ACTIONS: dict[str, Callable[[LabelingSession], object]] = {
-    "drag": lambda session: (session.start_drag(), session.drag_to(shifted(0.1)), session.end_drag()),
+    "drag": drag,
     "set_pose": lambda session: session.set_pose(shifted(0.2), Actor.SCRIPT),
     "reset": lambda session: session.reset(Actor.HUMAN),
     "undo": lambda session: session.undo(Actor.HUMAN),
@@ -194,7 +201,12 @@ def test_a_session_opens_as_submitted():
 
 def test_where_the_operator_looks_from_is_logged_and_is_no_step() -> None:
     bench = Bench()
-    camera = {"position": [0.0, 0.0, 1.0], "look_at": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "fov": 0.8}
+    camera: Camera = {
+        "position": [0.0, 0.0, 1.0],
+        "look_at": [0.0, 0.0, 0.0],
+        "up": [0.0, 1.0, 0.0],
+        "fov": 0.8,
+    }
     bench.session.start_drag()
     bench.session.look_from(camera, 0.7)  # even with the object in the hand
     (event,) = bench.log.events

@@ -21,8 +21,10 @@ from websockets.typing import Origin, Subprotocol
 
 from tests.app.waiting import LONGEST
 
+Message = dict[str, Any]
+
 GIZMO = "/object"
-CAMERA = {
+CAMERA: Message = {
     "wxyz": [1.0, 0.0, 0.0, 0.0],
     "position": [1.0, 1.0, 1.0],
     "image_height": 600,
@@ -33,8 +35,6 @@ CAMERA = {
     "look_at": [0.0, 0.0, 0.0],
     "up_direction": [0.0, 0.0, 1.0],
 }
-
-Message = dict[str, Any]
 
 
 class ViserClient:

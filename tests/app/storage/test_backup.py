@@ -77,7 +77,7 @@ def test_a_backup_amid_writes_holds_what_was_saved_and_all_its_files(state_dir: 
         with copy.read() as session:
             saved = session.scalar(select(func.count(Export.id)))
     assert found.faults == ()
-    assert before <= saved <= after + 1
+    assert saved is not None and before <= saved <= after + 1
 
 
 def test_a_server_starts_on_what_a_running_one_was_backed_up_to(state_dir: Path, tmp_path: Path) -> None:

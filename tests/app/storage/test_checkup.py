@@ -35,6 +35,7 @@ def test_damaged_and_missing_files_are_named(snap6d: Command, state_dir: Path) -
     with database.read() as session:
         frame = session.get_one(Frame, 2)
     database.close()
+    assert frame.color_hash is not None
     files = FileStore(state_dir / "files")
     files.path(frame.depth_hash).write_bytes(b"something else")
     files.path(frame.color_hash).unlink()

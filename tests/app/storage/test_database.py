@@ -218,12 +218,13 @@ def test_the_log_can_only_grow(database, registration_id, table, column):
 
 
 @pytest.fixture
-def later_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """This version becomes one that has another migration."""
+def later_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """This version becomes one that has another migration; its folder."""
     project = tmp_path / "project"
     shutil.copytree(PROJECT / "migrations", project / "migrations")
     (project / "migrations/versions/later.py").write_text(LATER_REVISION.format(head=HEAD))
     monkeypatch.setattr(app.storage.database, "PROJECT", project)
+    return project
 
 
 def test_a_database_of_this_version_is_fine(database):
@@ -331,7 +332,7 @@ def test_a_newer_database_is_left_alone(database):
 
 
 def test_a_migration_that_fails_leaves_nothing_behind(tmp_path, later_revision):
-    later = app.storage.database.PROJECT / "migrations/versions/later.py"
+    later = later_revision / "migrations/versions/later.py"
     later.write_text(later.read_text().replace("CREATE TABLE later (id INTEGER)", "CREATE NONSENSE"))
     broken = Database(f"sqlite:///{tmp_path / 'new.sqlite'}")
     with pytest.raises(DBAPIError, match="NONSENSE"):

@@ -64,13 +64,14 @@ def estimate(snap_id: str, registration_id: int) -> EstimateRow:
 
 def test_all_of_an_event_comes_back(log, registrations):
     T_before, T_after = np.eye(4).tolist(), pose.exp([0.1, 1 / 3, np.pi, 0.4, 0.5, 0.6]).tolist()
+    path = [[0.0, 1, 2, 3, 1, 0, 0, 0], [0.05, 1, 2, 4, 1, 0, 0, 0]]
     event = NewEvent(
         kind="drag",
         actor=Actor.HUMAN,
         T_before=T_before,
         T_after=T_after,
         dof=("tx", "rz"),
-        path=[[0.0, 1, 2, 3, 1, 0, 0, 0], [0.05, 1, 2, 4, 1, 0, 0, 0]],
+        path=path,
         duration_seconds=0.05,
         snap_id="abc",
         detail={"note": "ü"},
@@ -80,7 +81,7 @@ def test_all_of_an_event_comes_back(log, registrations):
     assert (row.kind, row.actor, row.user_id, row.sequence, row.snap_id) == ("drag", "human", 1, 1, "abc")
     assert row.T_before == T_before and row.T_after == T_after  # to the last bit
     assert row.dof == ["tx", "rz"] and row.duration_seconds == 0.05 and row.detail == {"note": "ü"}
-    assert row.path == [list(map(float, line)) for line in event.path]
+    assert row.path == [list(map(float, line)) for line in path]
 
 
 def test_the_clock_is_the_servers(log, registrations):

@@ -5,6 +5,7 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from shutil import copytree, make_archive
+from typing import Any
 
 import httpx
 import numpy as np
@@ -84,7 +85,7 @@ def dragged(server: Server, http: httpx.Client, registration_id: int, T: np.ndar
             state = http.get(url).json()
             return state["revision"] > before and not state["dragging"] and is_at(state, T)
 
-        def is_at(state: dict[str, object], T: np.ndarray) -> bool:
+        def is_at(state: dict[str, Any], T: np.ndarray) -> bool:
             return np.allclose(state["T_world_object"], T) or str(state["message"]).startswith(NOT_SAVED)
 
         wait_until(is_told, "the drag to end")

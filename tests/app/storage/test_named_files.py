@@ -54,7 +54,9 @@ def test_a_damaged_file_is_told_by_its_owner_and_mended_by_another_import(store,
         assert message.startswith(f"{what} is damaged on the disk (file ") and message.endswith(again)
     summary = import_dataset(database, store, demo)
     assert (summary.objects, summary.frames) == (0, 0)
-    assert data.depth(frame).any() and data.color(frame).any() and len(data.model(item).faces) > 0
+    color = data.color(frame)
+    assert color is not None and color.any()
+    assert data.depth(frame).any() and len(data.model(item).faces) > 0
 
 
 def test_the_archive_of_an_export_is_made_again(store, database):

@@ -56,6 +56,7 @@ def test_who_has_begun_a_task_goes_straight_back_to_it(database, join):
     with database.write() as session:
         session.add(Registration(task_id=first.id, user_id=participant.user_id))
     place = place_of(database, participant.user_id)
+    assert place.trial is not None
     assert (place.screens, place.is_begun, place.trial.task_id) == (("task",), True, first.id)
 
 

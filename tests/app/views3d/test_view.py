@@ -4,6 +4,7 @@ import io
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from registration_core import ObjectModel
 from registration_core.geometry import pose
 from registration_core.geometry.mesh_file import plain_ply
 from tests.app.export.site import NEAR_VIEW, TOOL, mesh_of, model_of
-from tests.app.labeling.viser_client import CAMERA, ViserClient
+from tests.app.labeling.viser_client import CAMERA, Message, ViserClient
 from tests.app.waiting import wait_until
 
 T_WORLD_OBJECT = pose.exp([0.1, -0.2, 0.3, 0.2, 0.4, -0.3])
@@ -129,14 +130,16 @@ def test_the_cloud_arrives_in_full_precision_and_is_replaced(view):
         client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
 
 
+def hides(name: str, message: Message) -> bool:
+    return message["name"] == name and not message["visible"]
+
+
 def test_cloud_and_mesh_are_put_away_and_the_gizmo_stays(view):
     view.show_cloud(POINTS, COLORS, point_size=0.002)
     with connect(view) as client:
         view.show_layers(Layers(cloud=False, mesh=False))
         for name in ("/cloud", "/object/mesh"):
-            client.wait_for(
-                "SetSceneNodeVisibilityMessage", lambda m, name=name: m["name"] == name and not m["visible"]
-            )
+            client.wait_for("SetSceneNodeVisibilityMessage", partial(hides, name))
         view.show_cloud(POINTS[:1], COLORS[:1], point_size=0.001)  # of another frame
         client.wait_for("PointCloudMessage", lambda m: m["props"]["points"].size == 3)
     with connect(view) as again:
@@ -148,6 +151,7 @@ def test_an_object_in_its_own_colours_is_where_its_mesh_is(hand, model):
     painted = mesh_of(TOOL)
     painted.visual.vertex_colors = [255, 0, 0, 255]
     textured = textured_mesh(plain_ply(painted), "ply", None, model)
+    assert textured is not None
     handlers = DragHandlers(hand.start, hand.move, hand.end)
     view = SceneView(model, T_WORLD_OBJECT, FIRST_VIEW, handlers, drawable, textured)
     with closing(view), connect(view) as client:
@@ -247,16 +251,17 @@ def visible(client: ViserClient, shown: bool) -> None:
     )
 
 
+def puts_the_ghost(at: np.ndarray, message: Message) -> bool:
+    return message["name"] == "/ghost" and np.allclose(message["position"], at, atol=1e-6)
+
+
 def test_a_ghost_comes_moves_and_goes(view, model):
     with connect(view) as client:
         view.show_ghost(None)
         for T in (T_WORLD_OBJECT, T_WORLD_OBJECT @ pose.exp([0.05, 0, 0, 0, 0, 0.3])):
             view.show_ghost(T)
             centre = pose.apply(T, model.centre)
-            client.wait_for(
-                "SetPositionMessage",
-                lambda m, at=centre: m["name"] == "/ghost" and np.allclose(m["position"], at, atol=1e-6),
-            )
+            client.wait_for("SetPositionMessage", partial(puts_the_ghost, centre))
         ghost = client.node("MeshMessage", "/ghost")["props"]
         mesh = client.node("MeshMessage", "/object/mesh")["props"]
         assert ghost["color"] != mesh["color"] and 0 < ghost["opacity"] < 1
@@ -328,7 +333,8 @@ def test_a_gizmo_in_the_worlds_axes_carries_the_turned_mesh(view, hand, model):
 
 
 def test_what_the_page_looks_from_is_known_and_can_be_changed(view):
-    assert view.viewpoint is None
+    before = view.viewpoint
+    assert before is None
     with connect(view) as client:
         wait_until(lambda: view.viewpoint is not None, "the page to be known")
         there = view.viewpoint
@@ -367,14 +373,16 @@ def test_a_drag_that_cannot_be_saved_does_not_break_the_view(view, hand, model):
         hand.wait_for_ends(2)
 
 
+def updates_the_object(what: str, message: Message) -> bool:
+    return message["name"] == "/object" and what in message["updates"]
+
+
 def test_a_locked_object_has_no_handles_left(view):
     with connect(view) as client:
         client.node("TransformControlsMessage", "/object")
         view.lock_object(True)
         for name in ("disable_axes", "disable_sliders", "disable_rotations"):
-            update = client.wait_for(
-                "SceneNodeUpdateMessage", lambda m, name=name: m["name"] == "/object" and name in m["updates"]
-            )
+            update = client.wait_for("SceneNodeUpdateMessage", partial(updates_the_object, name))
             assert update["updates"][name] is True
 
 

@@ -4,13 +4,14 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from distributed import Nanny, Scheduler, Worker
 
-from app.workers.jobs import JobResult
+from app.workers.jobs import JobResult, SnapJob
 from app.workers.pool import DIED, SnapError, Snapper
 from registration_core import ObjectModel, SnapConfig, region_of_interest
 from tests.app.export.site import CAMERA
@@ -86,7 +87,7 @@ def forbid_building(snapper: Snapper) -> None:
     def forbid() -> None:
         from app.workers import jobs
 
-        jobs.build_viewpoint_model = None
+        jobs.build_viewpoint_model = None  # type: ignore[attr-defined,assignment]
 
     snapper._client.result().run(forbid)
 
@@ -146,6 +147,11 @@ def test_of_those_that_wait_for_a_worker_the_urgent_goes_first(tmp_path, model):
         check_that_the_urgent_goes_first(alone, model)
 
 
+def handed_over(snapper: Snapper, job: SnapJob) -> bool:
+    """Whether Dask has a snap."""
+    return snapper._pending[job.snap_id].future is not None
+
+
 def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> None:
     running, cancel = request(snapper, new_job(model, snapper.topic, SLOW), model)
     assert running.moved.wait(LONGEST)
@@ -163,7 +169,7 @@ def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> No
     for name, priority in (("live", -1), ("asked for", 0)):
         job = new_job(model)
         snapper.request(job, model, told.on_progress, note(name), priority)
-        wait_until(lambda job=job: snapper._pending[job.snap_id].future, "the snap to be handed over")
+        wait_until(partial(handed_over, snapper, job), "the snap to be handed over")
     cancel()
     assert isinstance(result_of(told), JobResult)
     assert order == ["asked for", "live"] and told.shares == []
@@ -269,7 +275,9 @@ def test_what_was_built_is_never_built_again(tmp_path):
         second.wait_until_ready()
         forbid_building(second)
         outcome, _ = request(second, new_job(model, second.topic), model)
-        assert_same(result_of(outcome).estimate, done_here(new_job(model), model))
+        result = result_of(outcome)
+        assert isinstance(result, JobResult)
+        assert_same(result.estimate, done_here(new_job(model), model))
         other = new_model()
         outcome, _ = request(second, new_job(other, second.topic), other)
         assert isinstance(result_of(outcome), SnapError)  # so building was forbidden indeed

@@ -65,7 +65,7 @@ def test_who_asks_while_the_server_closes_leaves_no_worker_at_it(cluster, model,
         asked.append(cancel)
         close_objects()
 
-    elsewhere._objects.close = late
+    elsewhere._objects.close = late  # type: ignore[method-assign]
     elsewhere.close()
     asked[0]()  # too late to matter
     wait_until_idle(cluster)
@@ -102,8 +102,10 @@ def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
         return note
 
     with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
-        elsewhere._on_done = noted(elsewhere._on_done)
-        elsewhere._objects._on_built = noted(elsewhere._objects._on_built)
+        elsewhere._on_done = noted(elsewhere._on_done)  # type: ignore[method-assign]
+        elsewhere._objects._on_built = noted(  # type: ignore[method-assign]
+            elsewhere._objects._on_built
+        )
         model = new_model()
         outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
         assert isinstance(result_of(outcome), JobResult)

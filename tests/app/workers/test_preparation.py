@@ -18,8 +18,8 @@ from registration_core import ObjectModel, Symmetries, SymmetryAxis
 from registration_core.geometry.object_model import ContinuousSymmetry
 from tests.app.datasets.test_importing import THREAD_MESH
 from tests.app.small_dataset import BLOCK, TOOL
+from tests.app.snap_jobs import knowing
 from tests.app.waiting import wait_until
-from tests.app.workers.test_pool import knowing
 
 HALF_TURN = SymmetryAxis(np.array([0.0, 0.0, 1.0]), np.zeros(3), 2)
 
@@ -77,7 +77,8 @@ def test_symmetries_of_objects_from_before_there_were_suggestions_are_suggested(
     block, tool = (next(item for item in objects_of(services) if item.obj_id == id_) for id_ in (BLOCK, TOOL))
     preparation.start()
     wait_until(lambda: None not in (suggested(services, block), suggested(services, tool)), "suggestions")
-    assert [entry["fold"] for entry in suggested(services, block)] == [4, 2, 2, 2, 2]
+    found = suggested(services, block)
+    assert found is not None and [entry["fold"] for entry in found] == [4, 2, 2, 2, 2]
     assert suggested(services, tool) == []
     assert [item.obj_id for item in objects_of(services) if item.suggestions_open] == [BLOCK]
 

@@ -69,7 +69,7 @@ def needed(operation: str) -> Role | None:
 
 def _tried(client: httpx.Client, role: Role | None, operation: str) -> Outcome:
     method, path = operation.split(" ")
-    body = {} if method in {"POST", "PUT"} else None
+    body: dict[str, object] | None = {} if method in {"POST", "PUT"} else None
     with client.stream(method, re.sub(r"{\w+}", NOTHING, path), json=body) as answer:
         status = answer.status_code
     least = needed(operation)

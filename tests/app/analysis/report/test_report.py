@@ -3,6 +3,7 @@
 import csv
 import io
 import xml.etree.ElementTree as ET
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -19,7 +20,7 @@ from app.analysis.study_data.selection import Selection, choices_of
 from tests.app.analysis.hand_made import at
 from tests.app.analysis.trials import NAN, trial
 
-SNAPPED = {"stg_translation": [0.002] * 4, "stg_rotation": [0.02] * 4}
+SNAPPED: dict[str, Any] = {"stg_translation": [0.002] * 4, "stg_rotation": [0.02] * 4}
 FAR = trial([0.5, 0.4], [1.0, 0.9], operator="P9", group="novice", registration_id=9)
 
 

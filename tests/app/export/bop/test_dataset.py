@@ -42,6 +42,7 @@ def labelled_images(dataset: BopDataset) -> list[tuple[str, np.ndarray, BopImage
 
 def test_ground_truth_is_what_was_submitted(dataset: BopDataset) -> None:
     for label, T_world_camera, image in labelled_images(dataset):
+        assert image.ground_truth is not None
         for truth in image.ground_truth:
             wanted = pose.inverse(T_world_camera) @ true_pose(label, truth.obj_id)
             np.testing.assert_allclose(truth.T_camera_object, wanted, atol=1e-12)
@@ -81,6 +82,7 @@ def test_masks_are_what_another_renderer_draws(exported: ExportedSite, dataset: 
     for _, _, image in labelled_images(dataset):
         folder = image.depth.path.parents[1]
         observed = read_depth(image.depth.path, image.depth_scale)
+        assert image.ground_truth is not None
         for index, truth in enumerate(image.ground_truth):
             name = f"{image.image_id:06d}_{index:06d}.png"
             rendered = caster.depth(truth.obj_id, image.camera, truth.T_camera_object)

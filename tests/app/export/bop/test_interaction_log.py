@@ -79,10 +79,11 @@ def written(site: Site, folder: Path) -> tuple[list[dict], list[dict]]:
     """Events and estimates of the JSON lines."""
     with site.database.read() as session:
         write_interaction_log(session, site.dataset_id, folder)
-    return tuple(
+    events, estimates = (
         [json.loads(line) for line in (folder / f"{name}.jsonl").read_text().splitlines()]
         for name in ("events", "estimates")
     )
+    return events, estimates
 
 
 def test_every_event_is_there_in_order_with_all_that_is_known_of_it(site: Site, tmp_path: Path) -> None:

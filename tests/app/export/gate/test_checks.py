@@ -17,7 +17,7 @@ from tests.app.export.site import POSED_VIEWS, ExportedSite, ignore_progress
 SCENE = "test/000001"
 
 
-def edit(path: Path, change: Callable[[Any], None]) -> None:
+def edit(path: Path, change: Callable[[Any], object]) -> None:
     """Change a JSON file."""
     content = json.loads(path.read_text())
     change(content)
@@ -71,7 +71,12 @@ def scene_file(root: Path, name: str) -> Path:
     return root / SCENE / name
 
 
-Sabotage = Callable[[Path], None]
+def lose_image(root: Path) -> None:
+    edit(scene_file(root, "scene_camera.json"), lambda c: c.pop("5"))
+    edit(scene_file(root, "scene_gt.json"), lambda c: c.pop("5"))
+
+
+Sabotage = Callable[[Path], object]
 
 SABOTAGES: dict[str, tuple[Sabotage, str]] = {
     "w2c inverted": (
@@ -123,10 +128,7 @@ SABOTAGES: dict[str, tuple[Sabotage, str]] = {
         r"image 0: scene_gt.json has 1 objects, the database 2",
     ),
     "an image lost": (
-        lambda root: (
-            edit(scene_file(root, "scene_camera.json"), lambda c: c.pop("5"))
-            or edit(scene_file(root, "scene_gt.json"), lambda c: c.pop("5"))
-        ),
+        lose_image,
         r"test/000001, image 5 is missing",
     ),
     "masks swapped": (

@@ -10,6 +10,7 @@ from sqlalchemy import select
 
 from app.datasets.symmetries import decide
 from app.labeling.live.sessions import NotFoundError
+from app.labeling.session_state import SessionState
 from app.recent import Recent
 from app.storage.roles import Actor, Role
 from app.storage.tables import Object, Participant, Registration, Study, Task, User, utc_now
@@ -151,7 +152,7 @@ def test_the_view_is_made_once_and_goes_with_the_session(services, live_session,
 
 def test_sessions_of_an_object_go_on_with_symmetries_that_are_decided_meanwhile(services, live_session, ann):
     other = services.live_sessions.start(2, ann)
-    told = []
+    told: list[SessionState] = []
     live_session.session.subscribe(told.append)
     T_turned = shown(live_session) @ pose.exp([0, 0, 0, 0, 0, np.pi])
     before = live_session.model

@@ -1,5 +1,7 @@
 """What is done of a scene beside the thing that is worked on: told, shown, and known to snaps."""
 
+from functools import partial
+
 import numpy as np
 
 from app.access.auth import Identity
@@ -11,7 +13,7 @@ from app.storage.tables import Task
 from registration_core import SnapConfig, explained_pixels, propose
 from registration_core.geometry import pose
 from tests.app.labeling.live_sessions import sign_up, wait_for_snap
-from tests.app.labeling.viser_client import ViserClient
+from tests.app.labeling.viser_client import Message, ViserClient
 from tests.app.small_dataset import BLOCK, TOOL, true_pose
 from tests.app.waiting import wait_until
 
@@ -125,17 +127,16 @@ def test_the_view_shows_what_is_done_in_its_colour_until_it_is_hidden(services, 
             live_session.neighbours.show(True)
 
 
+def locks_the_object(locked: bool, message: Message) -> bool:
+    return message["name"] == "/object" and message["updates"].get("disable_axes") is locked
+
+
 def test_an_object_that_was_reopened_gets_its_handles_back(services, live_session):
     with ViserClient(services.live_sessions.view_socket(live_session)) as client:
         client.node("TransformControlsMessage", "/object")
         for act, locked in ((live_session.session.submit, True), (live_session.session.reopen, False)):
             act(Actor.HUMAN)
-            client.wait_for(
-                "SceneNodeUpdateMessage",
-                lambda m, locked=locked: (
-                    m["name"] == "/object" and m["updates"].get("disable_axes") is locked
-                ),
-            )
+            client.wait_for("SceneNodeUpdateMessage", partial(locks_the_object, locked))
 
 
 def test_who_cannot_be_told_does_not_take_back_what_happened(services, live_session, ann, monkeypatch):

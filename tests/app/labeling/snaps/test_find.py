@@ -91,7 +91,8 @@ def test_taking_a_candidate_is_logged_with_where_it_stems_from_and_undone(bench)
 def test_a_preview_goes_away_with_the_pose_that_it_was_looked_at_from(bench):
     bench.session.preview(shifted(0.1))
     bench.session.start_drag()
-    assert bench.state.preview is None
+    held = bench.state
+    assert held.preview is None
     bench.session.end_drag()
     assert np.array_equal(bench.state.preview, shifted(0.1))
     bench.session.snap(Actor.HUMAN)

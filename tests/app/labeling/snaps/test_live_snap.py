@@ -169,6 +169,7 @@ def test_what_is_shown_is_accepted_with_its_estimate_in_one_go(live):
     (row,) = live.log.estimates
     assert (row.snap_id, row.seed, row.frame_id) == (look.order.snap_id, LIVE_SEED, FRAMES[0])
     assert np.array_equal(row.T_world_object_start, shifted(0.1))
+    assert look.order.start_spread is not None
     assert row.start_spread == list(look.order.start_spread)
     live.session.undo(Actor.HUMAN)
     assert np.array_equal(live.state.T_world_object, shifted(0.1))

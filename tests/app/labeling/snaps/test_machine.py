@@ -152,6 +152,7 @@ def test_snap_computes_with_the_tasks_method_until_another_is_chosen():
     bench = Bench(method="paper")
     bench.session.snap(Actor.HUMAN)
     assert bench.workers.snaps[-1].order.config == SnapConfig.paper()
+    assert bench.state.snap is not None
     assert bench.state.method == bench.state.snap.method == "paper"
     bench.session.choose_method("default")
     bench.session.snap(Actor.HUMAN)

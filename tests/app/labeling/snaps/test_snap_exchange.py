@@ -163,17 +163,24 @@ def test_progress_never_goes_back_nor_beyond_1(bench):
     assert shares == [0.3, 0.3, 0.7, 1.0]
 
 
+def undo_then_drag(bench: Bench) -> None:
+    bench.session.undo(Actor.HUMAN)
+    bench.drag(shifted(0.3))
+
+
+def undo_two_redo_one(bench: Bench) -> None:
+    bench.session.undo(Actor.HUMAN)
+    bench.session.undo(Actor.HUMAN)
+    bench.session.redo(Actor.HUMAN)
+
+
 MOVES: dict[str, Callable[[Bench], object]] = {
     "drag": lambda bench: bench.drag(shifted(0.3)),
     "set_pose": lambda bench: bench.session.set_pose(shifted(0.3), Actor.SCRIPT),
     "undo": lambda bench: bench.session.undo(Actor.HUMAN),
     "reset": lambda bench: bench.session.reset(Actor.HUMAN),
-    "undo, then drag": lambda bench: (bench.session.undo(Actor.HUMAN), bench.drag(shifted(0.3))),
-    "two undone, one redone": lambda bench: (
-        bench.session.undo(Actor.HUMAN),
-        bench.session.undo(Actor.HUMAN),
-        bench.session.redo(Actor.HUMAN),
-    ),
+    "undo, then drag": undo_then_drag,
+    "two undone, one redone": undo_two_redo_one,
 }
 
 
@@ -311,6 +318,7 @@ def test_a_failure_that_comes_at_once_is_told_too():
 
     bench = Bench(request_snap=refuse)
     bench.session.snap(Actor.HUMAN)
+    assert bench.state.snap is not None
     assert (bench.state.snap.state, bench.state.snap.message) == ("failed", "out of view")
 
 

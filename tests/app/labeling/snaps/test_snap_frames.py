@@ -1,10 +1,12 @@
 """A snap uses the frames that see the object, the one at hand first, and keeps one to check the result by."""
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 import pytest
 
+from app.datasets.scene_data import SceneData
 from app.labeling.snaps.snap_exchange import SnapFrames
 from app.labeling.snaps.snap_frames import MOST_OTHERS, MOST_USED, FramesOfScene
 from app.storage.tables import Frame, Object
@@ -39,7 +41,7 @@ def scene(*angles: float | None) -> FramesOfScene:
         return Frame(id=number, T_world_camera=T.tolist(), **size, **lens)
 
     frames = {number: frame(number, degrees) for number, degrees in enumerate(angles, start=1)}
-    return FramesOfScene(Pictures(), frames, Object())
+    return FramesOfScene(cast(SceneData, Pictures()), frames, Object())
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,12 @@
 """A session's orders, done by real workers on real depth."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from app.datasets.scene_data import camera_of
 from app.storage.roles import Actor
+from app.workers.jobs import SnapJob
 from registration_core import SnapConfig
 from registration_core.geometry import pose
 from registration_core.geometry.pose_error import adi
@@ -41,7 +44,12 @@ def test_every_frame_of_a_scene_gives_the_same_pose(services, live_session):
 
 def test_colours_go_with_the_frames_that_are_searched(services, live_session, monkeypatch):
     jobs = []
-    monkeypatch.setattr(services.snapper, "request", lambda job, *_: jobs.append(job) or (lambda: None))
+
+    def keep(job: SnapJob, *_: object) -> Callable[[], None]:
+        jobs.append(job)
+        return lambda: None
+
+    monkeypatch.setattr(services.snapper, "request", keep)
     live_session.session.set_pose(true_pose(TOOL), Actor.HUMAN)
     live_session.session.snap(Actor.HUMAN, frames="current")
     (job,) = jobs

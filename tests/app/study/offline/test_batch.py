@@ -15,7 +15,7 @@ from app.storage.event_log import EventLog
 from app.storage.registration_rows import whole_registration
 from app.storage.roles import Actor, Role
 from app.storage.tables import OfflineSnap, utc_now
-from app.study.offline.batch import OfflineBatch, OfflineError, Summary
+from app.study.offline.batch import OfflineBatch, OfflineError, Plan, Summary
 from app.study.offline.samples import samples_of
 from app.study.offline.sampling import Sampling
 from app.study.offline.snap_store import SnapStore, StoreError
@@ -110,6 +110,7 @@ def test_a_snap_can_be_repeated_from_what_is_stored(made):
     made.run(registration_id)
     row = made.rows(registration_id)[0]
     registration = whole_registration(made.services.database, registration_id)
+    assert registration is not None
     frame, data = registration.task.frame, made.services.data
     T_world_camera = np.array(frame.T_world_camera)
     estimate = snap(
@@ -162,7 +163,9 @@ def test_a_snap_that_fails_says_why_and_stops_no_other(made):
 
 
 def test_a_snap_looks_at_the_frame_that_was_shown(made):
-    task = whole_registration(made.services.database, made.register("ann", beside(0.0))).task
+    first = whole_registration(made.services.database, made.register("ann", beside(0.0)))
+    assert first is not None
+    task = first.task
     other = next(frame for frame in task.scene.frames if frame.id != task.frame_id)
     registration_id = made.register("bob", beside(0.02), beside(0.02), frame_id=other.id)
     samples = list(samples_of(made.services.database, registration_id, SnapConfig()))
@@ -223,7 +226,8 @@ def test_the_papers_filter_has_snaps_of_its_own_from_fewer_poses(made, monkeypat
     short = replace(SnapConfig.paper(), particle_filter=ParticleFilterConfig(particles=40, iterations=20))
     monkeypatch.setattr("app.study.offline.batch.config_of", lambda method: short)
     registration_id = made.register("ann", *map(beside, STEPS))
-    services, plans = made.services, []
+    services = made.services
+    plans: list[Plan] = []
     batch = OfflineBatch(services.database, services.data, services.snapper, "paper", Sampling(2.0, 0.02))
     summary = batch.run([registration_id], lambda done, total: None, plans.append)
     assert summary == Summary(samples=4, computed=3, failed=0)
@@ -243,7 +247,7 @@ def test_a_longer_batch_says_so_by_what_was_measured(made):
     made.run(registration_id)
     median = SnapStore(made.services.database).median_seconds([registration_id])
     other = made.register("bob", beside(0.04))
-    plans = []
+    plans: list[Plan] = []
     made.batch.run([registration_id, other], lambda done, total: None, plans.append)
     workers = made.services.snapper.worker_count()
     assert plans[0].seconds == pytest.approx(median / workers)

@@ -15,7 +15,7 @@ from app.storage.tables import Event, Participant, Registration, Study, Task
 from app.study.plan import StudyPlan
 from app.study.simulated.simulation import SimulationError, create_simulated, simulate
 from app.study.simulated.workplace import Workplace
-from app.study.studies import Studies
+from app.study.studies import Joined, Studies
 from registration_core.geometry import pose
 
 PLAN = {
@@ -49,7 +49,7 @@ def registrations_of(services: Services, study: Study) -> list[tuple[Participant
         .order_by(Registration.id)
     )
     with services.database.read() as session:
-        return [tuple(row) for row in session.execute(query)]
+        return [(row[0], row[1], row[2]) for row in session.execute(query)]
 
 
 def events_of(services: Services, study: Study) -> list[list[Event]]:
@@ -91,6 +91,7 @@ def test_the_log_tells_simulated_seconds(services, workplace):
         assert event.utc == study.created_at + timedelta(seconds=event.monotonic_seconds)
     drags = [event for log in logs for event in log if event.kind == "drag"]
     for drag in drags:
+        assert drag.path is not None and drag.dof is not None
         seconds = [row[0] for row in drag.path]
         assert seconds[-1] == pytest.approx(drag.duration_seconds, abs=1e-4)
         assert np.allclose(np.diff(seconds)[:-1], 0.05, atol=1e-3)
@@ -107,6 +108,7 @@ def test_the_trace_is_that_of_the_simulated_time(services, workplace):
     trace = trace_of(task.T_world_object_start, until_submission(log))
     assert trace.duration == pytest.approx(log[-1].monotonic_seconds - log[0].monotonic_seconds)
     assert not trace.idle
+    assert registration.T_world_object is not None
     assert np.allclose(trace.T_world_object, registration.T_world_object)
 
 
@@ -156,7 +158,8 @@ def test_who_was_interrupted_goes_on_later_and_the_clock_never_back(services, wo
 
 
 def test_a_study_whose_setting_up_was_interrupted_is_completed(services, workplace, monkeypatch):
-    add, added = Studies.add_participant, []
+    add = Studies.add_participant
+    added: list[Joined] = []
 
     def interrupt(*given, **more):
         if added:
