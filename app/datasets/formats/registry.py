@@ -1,13 +1,11 @@
 """Knows the formats of imports: every module of this folder that has a `FORMAT` is one."""
 
-import importlib
-import pkgutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-PACKAGE = __name__.rpartition(".")[0]
+from app.formats import formats_in
 
 
 @dataclass(frozen=True)
@@ -25,9 +23,7 @@ class ImportFormat:
 @cache
 def formats() -> tuple[ImportFormat, ...]:
     """All formats; BOP is asked last, and takes whatever no other one recognises."""
-    names = [module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])]
-    modules = [importlib.import_module(f"{PACKAGE}.{name}") for name in names]
-    found: list[ImportFormat] = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    found: list[ImportFormat] = formats_in(__package__)
     return tuple(sorted(found, key=lambda one: (one.name == "bop", one.name)))
 
 

@@ -1,14 +1,12 @@
 """Knows the formats of exports: every module of this folder that has a `FORMAT` is one."""
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
-PACKAGE = __name__.rpartition(".")[0]
+from app.formats import formats_in
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,5 @@ class ExportFormat:
 @cache
 def formats() -> Mapping[str, ExportFormat]:
     """All formats by name; the whole dataset comes first."""
-    names = [module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])]
-    modules = [importlib.import_module(f"{PACKAGE}.{name}") for name in sorted(names)]
-    found: list[ExportFormat] = [module.FORMAT for module in modules if hasattr(module, "FORMAT")]
+    found: list[ExportFormat] = formats_in(__package__)
     return MappingProxyType({one.name: one for one in found})
