@@ -12,7 +12,7 @@ BROKEN_WORDS = """() => {
         range.setStart(texts.currentNode, word.index);
         range.setEnd(texts.currentNode, word.index + word[0].length);
         const lines = new Set([...range.getClientRects()].map(({ top }) => top));
-        if (lines.size > 1 && word[0].length <= 20) broken.push(word[0]);
+        if (lines.size > 1 && word[0].length <= 12) broken.push(word[0]);
       }
     }
   }
