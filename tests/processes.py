@@ -11,7 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.config import PROJECT
+from app.access.auth import Auth
+from app.config import PROJECT, Settings
+from app.storage.database import Database
+from app.storage.roles import Role
 from tests.app.waiting import LONGEST
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
@@ -69,9 +72,11 @@ class Server:
         return f"{self.url}/sign-in#{self.secret}"
 
     def new_link(self, name: str, role: str = "operator") -> str:
-        """A one-time sign-in link of a new user."""
-        printed = self.command("user", "add", name, "--role", role)
-        return f"{self.url}/sign-in#{printed.strip().rsplit('#', 1)[1]}"
+        """A one-time sign-in link of a new user, as `snap6d user add` prints it, without a process for it."""
+        database = Database(Settings(state_dir=self.state_dir).resolved_database_url)
+        with contextlib.closing(database), contextlib.closing(Auth(database)) as auth:
+            user = auth.create_user(name, Role(role))
+            return f"{self.url}/sign-in#{auth.create_link(user.id)}"
 
     def command(self, *arguments: str) -> str:
         """What a `snap6d` command on the same state prints."""
