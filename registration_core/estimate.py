@@ -1,11 +1,12 @@
 """What a snap returns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from registration_core.algorithm import ALGORITHM
+from registration_core.hardware import hardware
 from registration_core.judge.ambiguity import Ambiguity
 from registration_core.judge.certificates import Certificates
 
@@ -51,6 +52,8 @@ class Estimate:
     """`snap(..., rng=np.random.default_rng(seed))` with the same inputs and `algorithm` gives it again."""
     algorithm: str = ALGORITHM
     """The hash of the numeric sources and fitted numbers that made it."""
+    hardware: str = field(default_factory=hardware)
+    """Names the machine that computed it."""
 
 
 class WorldEstimate(Estimate):

@@ -1,7 +1,5 @@
 """A live session as JSON: what a page or a script may know of a registration at one moment."""
 
-from dataclasses import asdict
-
 import numpy as np
 from pydantic import BaseModel, Field
 
@@ -12,6 +10,7 @@ from app.labeling.moves.degrees_of_freedom import GizmoAxes
 from app.labeling.moves.history import PosedBy
 from app.labeling.permissions import Tool
 from app.labeling.session_state import SessionState
+from app.labeling.snaps.snap_exchange import SnapStatus
 from app.storage.tables import FrameUse, Method, Pose
 from registration_core.geometry import pose
 from registration_core.rendering.depth_verdicts import Verdict
@@ -27,30 +26,6 @@ class AssessmentOut(BaseModel):
     threshold: float | None = Field(
         description="The confidence from which on that holds; null where none is known."
     )
-
-
-class FramesReportOut(BaseModel):
-    """What frames had to do with the result of a snap."""
-
-    used: int
-    """So many it was found in."""
-    agreeing: int
-    """So many others agree with it, ..."""
-    asked: int
-    """... of those that see enough of the object to tell."""
-
-
-class SnapOut(BaseModel):
-    """The last snap of a registration."""
-
-    id: str
-    asked_by: str = Field(description="human, script, or in `auto` the machine by itself")
-    state: str
-    progress: float
-    message: str | None
-    method: Method
-    frames: FramesReportOut | None
-    """Once it is done."""
 
 
 class OfferOut(BaseModel):
@@ -132,7 +107,7 @@ class RegistrationOut(BaseModel):
     """Nothing where no part of the object is in the frame, or the task is done without it."""
     saved: bool
     """Whether all of it is on the disk: a drag is when it ends."""
-    snap: SnapOut | None
+    snap: SnapStatus | None
     offer: OfferOut | None
     is_live: bool
     live: LiveOut | None
@@ -179,7 +154,7 @@ def registration_out(live_session: LiveSession) -> RegistrationOut:
         has_texture=live_session.textured is not None,
         agreement=_agreement_out(live_session, state),
         saved=not state.dragging,
-        snap=_snap_out(state),
+        snap=state.snap,
         offer=_offer_out(state),
         is_live=state.is_live,
         live=_live_out(state),
@@ -197,21 +172,6 @@ def registration_out(live_session: LiveSession) -> RegistrationOut:
 def assessment_out(assessment: Assessment) -> AssessmentOut:
     """An assessment as JSON."""
     return AssessmentOut(**assessment.stored())
-
-
-def _snap_out(state: SessionState) -> SnapOut | None:
-    snap = state.snap
-    if snap is None:
-        return None
-    return SnapOut(
-        id=snap.id,
-        asked_by=snap.asked_by,
-        state=snap.state,
-        progress=snap.progress,
-        message=snap.message,
-        method=snap.method,
-        frames=None if snap.frames is None else FramesReportOut(**asdict(snap.frames)),
-    )
 
 
 def _agreement_out(live_session: LiveSession, state: SessionState) -> AgreementOut | None:
@@ -237,7 +197,7 @@ def _offer_out(state: SessionState) -> OfferOut | None:
     return OfferOut(
         snap_id=offer.snap_id,
         T_world_object=offer.T_world_object.tolist(),
-        confidence=offer.confidence,
+        confidence=offer.assessment.confidence,
         assessment=assessment_out(offer.assessment),
         quiet=offer.quiet,
         withheld=offer.withheld,
@@ -249,9 +209,9 @@ def _live_out(state: SessionState) -> LiveOut | None:
     if live is None:
         return None
     return LiveOut(
-        T_world_object_start=live.T_world_object_start.tolist(),
+        T_world_object_start=live.order.T_world_object.tolist(),
         T_world_object=live.T_world_object.tolist(),
-        confidence=live.confidence,
+        confidence=live.assessment.confidence,
         assessment=assessment_out(live.assessment),
     )
 

@@ -9,10 +9,11 @@ from pydantic import BaseModel, Field
 from app.analysis.trace.pose_errors import PoseErrors, pose_errors
 from app.analysis.trace.trace import SAMPLE_SECONDS, Trace
 from app.api.dependencies import Id, IdentityDep, ServicesDep
-from app.api.registration_state import AssessmentOut, FramesReportOut, assessment_out
+from app.api.registration_state import AssessmentOut, assessment_out
 from app.api.tasks import Named
 from app.confidence.assessment import Assessed, Assessment
 from app.labeling.moves.history import PosedBy
+from app.labeling.snaps.snap_exchange import FramesReport
 from app.replay.recording import Recording, ShownEvent
 from app.replay.replays import Replay
 from app.storage.tables import Method, Pose
@@ -43,7 +44,7 @@ class TraceEvent(SpanOut):
     dof: list[str] | None
     technique: str | None
     method: Method | None = Field(description="of a snap, what it was computed with")
-    frames: FramesReportOut | None = Field(description="of the result of a snap, in how many it was found")
+    frames: FramesReport | None = Field(description="of the result of a snap, in how many it was found")
     confidence: float | None
     verdict: Assessed | None = Field(description="accept, look or doubt, as the operator was told")
 
@@ -213,11 +214,11 @@ def _event_out(sequence: int, event: ShownEvent, span: SpanOut, method: Method |
     )
 
 
-def _frames_out(event: ShownEvent) -> FramesReportOut | None:
+def _frames_out(event: ShownEvent) -> FramesReport | None:
     if event.kind not in ("snap_applied", "snap_offered") or "used_frames" not in event.detail:
         return None
     agrees = [one["agrees"] for one in event.detail["other_frames"] if one["agrees"] is not None]
-    return FramesReportOut(used=len(event.detail["used_frames"]), agreeing=sum(agrees), asked=len(agrees))
+    return FramesReport(used=len(event.detail["used_frames"]), agreeing=sum(agrees), asked=len(agrees))
 
 
 def _to_last(trace: Trace, T_world_object: np.ndarray, model: ObjectModel) -> PoseErrors:

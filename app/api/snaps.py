@@ -1,6 +1,5 @@
 """Snaps: asking for one, how it stands, and cancelling it."""
 
-from dataclasses import asdict
 from math import pi
 from typing import Annotated, Any, Literal, cast
 
@@ -15,6 +14,7 @@ from app.labeling.snaps.start_spread import Unsaid
 from app.services import Services
 from app.storage.tables import EstimateRow, Event, FrameUse, Method, Pose
 from app.workers.methods import method_of
+from app.workers.pool import Standing
 from registration_core import SnapConfig
 
 router = APIRouter(prefix="/api", tags=["snaps"])
@@ -59,12 +59,6 @@ class NewSnap(BaseModel):
         "or these; where null, as is chosen.",
         examples=["auto"],
     )
-
-
-class SnapId(BaseModel):
-    """The snap that was begun."""
-
-    id: str
 
 
 class HypothesisOut(BaseModel):
@@ -169,15 +163,6 @@ class EstimateOut(BaseModel):
     evaluations: int
 
 
-class StandingOut(BaseModel):
-    """How a snap stands with the workers."""
-
-    workers: int = Field(description="How many are there now.")
-    ahead: int = Field(description="How many snaps go before it.")
-    seconds: float = Field(description="How long it has waited or, once it runs, has run.")
-    preparing: bool = Field(description="Whether it waits for its object, which workers build once.")
-
-
 class SnapDetail(BaseModel):
     """How a snap stands."""
 
@@ -186,14 +171,16 @@ class SnapDetail(BaseModel):
     state: SnapState
     progress: float
     message: str | None
-    standing: StandingOut | None
+    standing: Standing | None
     """While it waits or runs."""
     withheld: str | None = Field(description="Why its result was only offered.")
     estimate: EstimateOut | None
 
 
 @router.post("/registrations/{registration_id}/snaps", status_code=202)
-def request_snap(live_session: LiveSessionDep, identity: AnyoneDep, body: NewSnap | None = None) -> SnapId:
+def request_snap(
+    live_session: LiveSessionDep, services: ServicesDep, identity: AnyoneDep, body: NewSnap | None = None
+) -> SnapDetail:
     """Ask the machine for a better pose from the present one."""
     wanted = body or NewSnap(seed=None, config=None, frames=None)
     try:
@@ -205,7 +192,8 @@ def request_snap(live_session: LiveSessionDep, identity: AnyoneDep, body: NewSna
     frames = tuple(dict.fromkeys(wanted.frames)) if isinstance(wanted.frames, list) else wanted.frames
     if config.method == "particle_filter" and isinstance(frames, tuple) and len(frames) > 1:
         raise InputError("body.frames must name one frame: the paper's filter knows one view.")
-    return SnapId(id=live_session.session.snap(identity.actor, config, wanted.seed, spread, frames))
+    snap_id = live_session.session.snap(identity.actor, config, wanted.seed, spread, frames)
+    return get_snap(snap_id, services, identity)
 
 
 @router.get("/snaps/{snap_id}")
@@ -230,7 +218,7 @@ def get_snap(snap_id: str, services: ServicesDep, identity: AnyoneDep) -> SnapDe
         )
     if live is not None and live.id == snap_id:
         state = cast(SnapState, live.state)  # "failed" where the outcome could not be saved
-        standing = _standing(services, snap_id)
+        standing = services.snapper.standing(snap_id)
         return _without_outcome(snap_id, registration_id, state, live.progress, live.message, standing)
     return _without_outcome(snap_id, registration_id, "failed", 0.0, INTERRUPTED)
 
@@ -260,7 +248,7 @@ def _without_outcome(
     state: SnapState,
     progress: float,
     message: str | None,
-    standing: StandingOut | None = None,
+    standing: Standing | None = None,
 ) -> SnapDetail:
     return SnapDetail(
         id=snap_id,
@@ -272,11 +260,6 @@ def _without_outcome(
         withheld=None,
         estimate=None,
     )
-
-
-def _standing(services: Services, snap_id: str) -> StandingOut | None:
-    standing = services.snapper.standing(snap_id)
-    return None if standing is None else StandingOut(**asdict(standing))
 
 
 def _estimate_out(row: EstimateRow) -> EstimateOut:

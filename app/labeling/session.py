@@ -31,7 +31,7 @@ from app.labeling.permissions import (
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.session_lock import SessionLock
 from app.labeling.session_state import SessionState
-from app.labeling.snaps.find import Region, Search, SearchOrder, SearchResult
+from app.labeling.snaps.find import Region, Search, SearchOrder
 from app.labeling.snaps.machine import Machine
 from app.labeling.snaps.request import Submit
 from app.labeling.snaps.snap_exchange import ChooseFrames, SnapOrder, SnapResult
@@ -39,6 +39,7 @@ from app.labeling.snaps.start_spread import StartSpread, Unsaid
 from app.storage.event_log import STATE_AFTER, NewEvent
 from app.storage.roles import Actor
 from app.storage.tables import Condition, FrameUse, Method
+from app.workers.jobs import Proposals
 from app.workers.methods import config_of
 from registration_core import SnapConfig
 from registration_core.symmetry.pose_equivalence import SamePose
@@ -83,7 +84,7 @@ class LabelingSession:
         same_pose: SamePose,
         record_event: RecordEvent,
         request_snap: Submit[SnapOrder, SnapResult],
-        request_search: Submit[SearchOrder, SearchResult],
+        request_search: Submit[SearchOrder, Proposals],
         choose_frames: ChooseFrames,
         skip_reason: str | None = None,
         known_objects: Callable[[], tuple[KnownObject, ...]] = tuple,

@@ -4,7 +4,6 @@ A worker needs no shared files: a job brings the depth it looks at, and what was
 and is kept.
 """
 
-import platform
 import signal
 import threading
 import time
@@ -29,6 +28,7 @@ from registration_core import (
     snap_views_steps,
 )
 from registration_core.compilation import warm_up
+from registration_core.hardware import hardware
 from registration_core.search.viewpoint_model import ViewpointModel, build_viewpoint_model, packed, unpacked
 
 KEPT_OBJECTS = 64
@@ -75,14 +75,6 @@ class ImageJob(Job[Result]):
 
 
 @dataclass(frozen=True)
-class JobResult:
-    """An estimate, and what it was made with."""
-
-    estimate: Estimate
-    hardware: str
-
-
-@dataclass(frozen=True)
 class JobView:
     """What a job may look at of one frame."""
 
@@ -99,7 +91,7 @@ class JobView:
 
 
 @dataclass(frozen=True)
-class SnapJob(Job[JobResult]):
+class SnapJob(Job[Estimate]):
     """A snap; its poses are in the camera axes of the frame that is shown, used or not."""
 
     seed: int
@@ -110,7 +102,7 @@ class SnapJob(Job[JobResult]):
     start_spread: tuple[float, float] | None
     """How far off T_camera_object may be, metres and radians; None where that is unknown."""
 
-    def run(self, known: ViewpointModel, tell: Tell) -> JobResult:
+    def run(self, known: ViewpointModel, tell: Tell) -> Estimate:
         """See `registration_core.snap_views`."""
         estimate = None
         rng = np.random.default_rng(self.seed)
@@ -128,7 +120,7 @@ class SnapJob(Job[JobResult]):
             tell(step.iteration / max(1, step.iterations))
             estimate = step.estimate
         assert estimate is not None
-        return JobResult(estimate, hardware())
+        return estimate
 
 
 @dataclass(frozen=True)
@@ -137,6 +129,7 @@ class Proposals:
 
     hypotheses: tuple[Hypothesis, ...]
     seconds: float
+    """Wall-clock time it took."""
     algorithm: str
     """`registration_core.ALGORITHM` of the worker."""
     hardware: str
@@ -238,8 +231,3 @@ def _keep(model_hash: str, built: ViewpointModel) -> None:
         _objects.move_to_end(model_hash)
         while len(_objects) > KEPT_OBJECTS:
             _objects.popitem(last=False)
-
-
-def hardware() -> str:
-    """Names the machine that this process computes on."""
-    return f"{platform.machine()} {platform.processor() or 'cpu'} on {platform.node()}"

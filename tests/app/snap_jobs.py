@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.storage.files import PreparedStore
-from app.workers.jobs import JobResult, JobView, SnapJob
+from app.workers.jobs import JobView, SnapJob
 from app.workers.pool import SnapError, Snapper
 from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap
 from registration_core.algorithm import VIEWPOINT_ALGORITHM
@@ -78,13 +78,13 @@ class Outcome:
     shares: list[float] = field(default_factory=list)
     moved: Event = field(default_factory=Event)
     ended: Event = field(default_factory=Event)
-    ends: list[JobResult | SnapError] = field(default_factory=list)
+    ends: list[Estimate | SnapError] = field(default_factory=list)
 
     def on_progress(self, share: float) -> None:
         self.shares.append(share)
         self.moved.set()
 
-    def on_end(self, outcome: JobResult | SnapError) -> None:
+    def on_end(self, outcome: Estimate | SnapError) -> None:
         self.ends.append(outcome)
         self.ended.set()
 
@@ -100,7 +100,7 @@ def request(snapper: Snapper, job: SnapJob, model: ObjectModel) -> tuple[Outcome
     return outcome, snapper.request(job, model, outcome.on_progress, outcome.on_end)
 
 
-def result_of(outcome: Outcome) -> JobResult | SnapError:
+def result_of(outcome: Outcome) -> Estimate | SnapError:
     """What it came to."""
     assert outcome.ended.wait(LONGEST)
     (end,) = outcome.ends

@@ -5,14 +5,17 @@ import uuid
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from app import __version__
 from app.labeling.moves.pose_record import PoseRecord
 from app.labeling.permissions import Tool, require
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.request import Request, Submit
-from app.labeling.snaps.snap_exchange import SnapFailure, SnapStatus, stored_known
+from app.labeling.snaps.snap_exchange import SnapStatus, stored_known
 from app.storage.event_log import NewEvent
 from app.storage.roles import Actor
-from registration_core import Hypothesis, SnapConfig
+from app.workers.jobs import Proposals
+from app.workers.pool import SnapError
+from registration_core import SnapConfig
 
 Region = tuple[int, int, int, int]
 """(left, top, width, height), pixels."""
@@ -32,17 +35,6 @@ class SearchOrder:
     """Other objects, whose depth is passed by."""
 
 
-@dataclass(frozen=True)
-class SearchResult:
-    """Likely poses, best first, and what they were made with."""
-
-    hypotheses: tuple[Hypothesis, ...]
-    seconds: float
-    version: str
-    algorithm: str
-    hardware: str
-
-
 class Search:
     """The newest search of a session, which lets nobody in while somebody else is.
 
@@ -57,7 +49,7 @@ class Search:
         self,
         record: PoseRecord,
         tools: Collection[Tool],
-        submit: Submit[SearchOrder, SearchResult],
+        submit: Submit[SearchOrder, Proposals],
         known_objects: Callable[[], tuple[KnownObject, ...]],
     ) -> None:
         self._record = record
@@ -91,7 +83,7 @@ class Search:
         }
         self._record.record(NewEvent("search_requested", actor, snap_id=order.search_id, detail=detail))
 
-        def settle(outcome: SearchResult | SnapFailure) -> None:
+        def settle(outcome: Proposals | SnapError) -> None:
             self._record.record(_outcome_event(order, outcome))
 
         self._request.start(order, SnapStatus(order.search_id, actor), settle)
@@ -112,8 +104,8 @@ class Search:
             self._request.status = None
 
 
-def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> NewEvent:
-    if isinstance(outcome, SnapFailure):
+def _outcome_event(order: SearchOrder, outcome: Proposals | SnapError) -> NewEvent:
+    if isinstance(outcome, SnapError):
         detail = {"message": str(outcome)}
         return NewEvent("search_failed", Actor.MACHINE, snap_id=order.search_id, detail=detail)
     return NewEvent(
@@ -130,7 +122,7 @@ def _outcome_event(order: SearchOrder, outcome: SearchResult | SnapFailure) -> N
                 }
                 for candidate in outcome.hypotheses
             ],
-            "version": outcome.version,
+            "version": __version__,
             "algorithm": outcome.algorithm,
             "hardware": outcome.hardware,
         },

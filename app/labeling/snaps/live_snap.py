@@ -1,30 +1,14 @@
 """Live snapping: the machine looks where a snap from the newest pose would land, one look at a time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from app.labeling.moves.pose_record import Array
 from app.labeling.snaps.request import Request, Submit
-from app.labeling.snaps.snap_exchange import Offer, SnapFailure, SnapOrder, SnapResult, SnapStatus
+from app.labeling.snaps.snap_exchange import Offer, SnapOrder, SnapResult, SnapStatus
 from app.storage.roles import Actor
-
-
-@dataclass(frozen=True)
-class Look:
-    """What one look found, and from where."""
-
-    order: SnapOrder
-    result: SnapResult
-
-    @property
-    def offer(self) -> Offer:
-        """As it is shown."""
-        order, result = self.order, self.result
-        return Offer(
-            order.snap_id, order.T_world_object, result.T_world_object, result.assessment, quiet=True
-        )
+from app.workers.pool import SnapError
 
 
 class LiveSnap:
@@ -39,7 +23,8 @@ class LiveSnap:
         self._sought: SnapOrder | None = None
         """The newest order."""
         self.is_on = False
-        self.found: Look | None = None
+        self.found: Offer | None = None
+        """Where a snap would land."""
 
     def follow(self, T_world_object: Array, frame_id: int, order: Callable[[], SnapOrder]) -> None:
         """Look from this pose, unless a look is under way: its end is followed by another call of this.
@@ -53,8 +38,8 @@ class LiveSnap:
             return
         sought = self._sought = order()
 
-        def settle(outcome: SnapResult | SnapFailure) -> None:
-            self.found = None if isinstance(outcome, SnapFailure) else Look(sought, outcome)
+        def settle(outcome: SnapResult | SnapError) -> None:
+            self.found = None if isinstance(outcome, SnapError) else Offer(sought, outcome, quiet=True)
 
         self._request.start(sought, SnapStatus(sought.snap_id, Actor.MACHINE), settle)
 

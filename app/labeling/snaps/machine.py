@@ -5,7 +5,6 @@ import uuid
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
-from app.confidence.assessment import Assessment
 from app.labeling.moves.history import Step
 from app.labeling.moves.pose_record import ActionError, Array, PoseRecord, said_of
 from app.labeling.permissions import Tool, Wanted, require, require_frames, require_method
@@ -16,7 +15,6 @@ from app.labeling.snaps.snap_exchange import (
     ChooseFrames,
     FramesReport,
     Offer,
-    SnapFailure,
     SnapFrames,
     SnapOrder,
     SnapResult,
@@ -32,6 +30,7 @@ from app.storage.event_log import NewEvent
 from app.storage.roles import Actor
 from app.storage.tables import FrameUse, Method
 from app.workers.methods import method_of
+from app.workers.pool import SnapError
 from registration_core import SnapConfig
 from registration_core.symmetry.pose_equivalence import SamePose
 
@@ -143,7 +142,7 @@ class Machine:
     @property
     def live(self) -> Offer | None:
         """Where a snap would land."""
-        return self._live.found.offer if self._live.found else None
+        return self._live.found
 
     def set_live(self, on: bool, actor: Actor) -> None:
         """Turn live snapping on or off."""
@@ -191,11 +190,11 @@ class Machine:
 
     def accept(self, actor: Actor) -> None:
         """Take the pose that is shown live, whose estimate is only written down now, or else the offer."""
-        look = self._live.found
-        offer = look.offer if look else self._require_offer()
-        step = _step(offer.T_world_object, offer.assessment, offer.snap_id)
+        live = self.live
+        offer = live or self._require_offer()
+        step = _step(offer.result, offer.snap_id)
         event = self._record.move_event("accept", actor, step, offer.snap_id)
-        row = estimate_row(self._registration_id, look.order, look.result) if look else None
+        row = estimate_row(self._registration_id, live.order, live.result) if live else None
         self._record.push(event, step, row)
         self.offer = None
         self._live.rest()
@@ -232,10 +231,10 @@ class Machine:
         return self._choose_frames(order.frame_id, order.T_world_object, order.known, wanted)
 
     def _settle(
-        self, order: SnapOrder, then: Step, asked_by: Actor, outcome: SnapResult | SnapFailure
+        self, order: SnapOrder, then: Step, asked_by: Actor, outcome: SnapResult | SnapError
     ) -> FramesReport | None:
         """Write down what came of a snap and, where it may, put the object there."""
-        if isinstance(outcome, SnapFailure):
+        if isinstance(outcome, SnapError):
             detail = {"message": str(outcome)}
             self._record.record(NewEvent("snap_failed", Actor.MACHINE, snap_id=order.snap_id, detail=detail))
             return None
@@ -245,7 +244,7 @@ class Machine:
         unasked = asked_by is Actor.MACHINE
         moved = self._record.drag is not None or self._record.history.current is not then
         withheld = MOVED_ON if moved else self._hesitates(result) if unasked else None
-        step = _step(result.T_world_object, result.assessment, order.snap_id)
+        step = _step(result, order.snap_id)
         event = NewEvent(
             kind="snap_offered" if withheld else "snap_applied",
             actor=Actor.MACHINE,
@@ -266,14 +265,7 @@ class Machine:
             self._taken_over += [result.T_world_object] if unasked else []
         else:
             self._record.record(event, row)
-            self.offer = Offer(
-                order.snap_id,
-                order.T_world_object,
-                result.T_world_object,
-                result.assessment,
-                unasked,
-                withheld,
-            )
+            self.offer = Offer(order, result, unasked, withheld)
         return frames_report(order, result.estimate)
 
     def _hesitates(self, result: SnapResult) -> str | None:
@@ -290,6 +282,12 @@ class Machine:
         return self.offer
 
 
-def _step(T_world_object: Array, assessment: Assessment, snap_id: str) -> Step:
-    confidence = assessment.confidence
-    return Step(T_world_object, confidence, snap_id=snap_id, assessment=assessment, posed_by="machine")
+def _step(result: SnapResult, snap_id: str) -> Step:
+    assessment = result.assessment
+    return Step(
+        result.T_world_object,
+        assessment.confidence,
+        snap_id=snap_id,
+        assessment=assessment,
+        posed_by="machine",
+    )

@@ -4,15 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Generic, TypeVar
 
-from app.labeling.snaps.snap_exchange import FramesReport, SnapFailure, SnapStatus
+from app.labeling.snaps.snap_exchange import FramesReport, SnapStatus
 from app.storage.faults import told
+from app.workers.pool import SnapError
 
 Order = TypeVar("Order")
 Result = TypeVar("Result")
 
-Submit = Callable[
-    [Order, Callable[[float], None], Callable[[Result | SnapFailure], None]], Callable[[], None]
-]
+Submit = Callable[[Order, Callable[[float], None], Callable[[Result | SnapError], None]], Callable[[], None]]
 """Hands an order to the workers, and returns a function that cancels it. Unless that is called, the first
 function gets shares in [0, 1], and the second is called once with the end; both from any thread."""
 
@@ -43,7 +42,7 @@ class Request(Generic[Order, Result]):
         self,
         order: Order,
         status: SnapStatus,
-        settle: Callable[[Result | SnapFailure], FramesReport | None],
+        settle: Callable[[Result | SnapError], FramesReport | None],
     ) -> None:
         """Submit an order, in the place of one that is under way.
 
@@ -60,11 +59,11 @@ class Request(Generic[Order, Result]):
                 progress = max(self._status.progress, min(1.0, share))
                 self.status = replace(self._status, state="running", progress=progress)
 
-        def ended(outcome: Result | SnapFailure) -> None:
+        def ended(outcome: Result | SnapError) -> None:
             if self._order is not order:
                 return
             self._order, self._cancel = None, _nothing
-            failed = isinstance(outcome, SnapFailure)
+            failed = isinstance(outcome, SnapError)
             try:
                 frames = settle(outcome)
             except Exception as error:

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app import __version__
 from app.confidence.assessment import Assessment
 from app.labeling.permissions import Wanted
 from app.labeling.scene.known_object import KnownObject
@@ -62,12 +63,6 @@ class SnapResult:
     symmetries_version: int
     """Of the object, that it was found with."""
     assessment: Assessment
-    version: str
-    hardware: str
-
-
-class SnapFailure(Exception):  # noqa: N818 - an outcome that is handed over, not raised
-    """Why a snap came to nothing; the message may be shown."""
 
 
 @dataclass(frozen=True)
@@ -105,22 +100,29 @@ class SnapStatus:
 
 @dataclass(frozen=True)
 class Offer:
-    """An estimate that waits for the operator's word."""
+    """A result that waits for the operator's word."""
 
-    snap_id: str
-    T_world_object_start: Array
-    """From where the machine looked."""
-    T_world_object: Array
-    assessment: Assessment
+    order: SnapOrder
+    result: SnapResult
     quiet: bool = False
     """Nobody asked for it: it is there to be taken, and asks for no answer."""
     withheld: str | None = None
     """Why the object was not put there."""
 
     @property
-    def confidence(self) -> float:
-        """As the assessment has it."""
-        return self.assessment.confidence
+    def snap_id(self) -> str:
+        """Of the snap that found it."""
+        return self.order.snap_id
+
+    @property
+    def T_world_object(self) -> Array:
+        """(4, 4), where the object would be put."""
+        return self.result.T_world_object
+
+    @property
+    def assessment(self) -> Assessment:
+        """What is to be thought of it."""
+        return self.result.assessment
 
 
 def stored_spread(spread: StartSpread | None) -> list[float] | None:
@@ -185,9 +187,9 @@ def estimate_row(registration_id: int, order: SnapOrder, result: SnapResult) -> 
         symmetries_version=result.symmetries_version,
         used_frames=list(order.frames.used),
         other_frames=stored_others(order, estimate),
-        version=result.version,
+        version=__version__,
         algorithm=estimate.algorithm,
-        hardware=result.hardware,
+        hardware=estimate.hardware,
         seconds=estimate.seconds,
         evaluations=estimate.evaluations,
     )

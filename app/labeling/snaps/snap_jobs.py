@@ -5,17 +5,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from app import __version__
 from app.confidence.assessment import Standard, assess
 from app.datasets.scene_data import SceneData, camera_of
 from app.labeling.scene.neighbours import Neighbours
-from app.labeling.snaps.find import SearchOrder, SearchResult
+from app.labeling.snaps.find import SearchOrder
 from app.labeling.snaps.session_object import SessionObject
-from app.labeling.snaps.snap_exchange import SnapFailure, SnapOrder, SnapResult
+from app.labeling.snaps.snap_exchange import SnapOrder, SnapResult
 from app.storage.tables import Frame
-from app.workers.jobs import JobResult, JobView, Proposals, SearchJob, SnapJob
+from app.workers.jobs import JobView, Proposals, SearchJob, SnapJob
 from app.workers.pool import SnapError, Snapper
-from registration_core import ObjectModel
+from registration_core import Estimate, ObjectModel
 from registration_core.geometry import pose
 from registration_core.search.snap_input import region_of_interest
 
@@ -55,29 +54,24 @@ class Dispatch:
         self,
         order: SnapOrder,
         on_progress: Callable[[float], None],
-        on_end: Callable[[SnapResult | SnapFailure], None],
+        on_end: Callable[[SnapResult | SnapError], None],
     ) -> Callable[[], None]:
         """Let a worker look for a better pose; returns a function that cancels it."""
         T_world_camera = np.array(self._frames[order.frame_id].T_world_camera)
         sought = self._sought.present
 
-        def ended(outcome: JobResult | SnapError) -> None:
+        def ended(outcome: Estimate | SnapError) -> None:
             if isinstance(outcome, SnapError):
-                on_end(SnapFailure(str(outcome)))
+                on_end(outcome)
                 return
-            T_world_object = T_world_camera @ outcome.estimate.T_camera_object
-            assessment = assess(outcome.estimate, self._standard(), sought.model)
-            version = sought.symmetries_version
-            on_end(
-                SnapResult(
-                    outcome.estimate, T_world_object, version, assessment, __version__, outcome.hardware
-                )
-            )
+            T_world_object = T_world_camera @ outcome.T_camera_object
+            assessment = assess(outcome, self._standard(), sought.model)
+            on_end(SnapResult(outcome, T_world_object, sought.symmetries_version, assessment))
 
         try:
             job = self._snap_job(order, sought.model)
         except ValueError as error:
-            on_end(SnapFailure(f"The snap cannot work on this: {error}."))
+            on_end(SnapError(f"The snap cannot work on this: {error}."))
             return lambda: None
         priority = LIVE_PRIORITY if order.is_live else 0
         return self._snapper.request(job, sought.model, on_progress, ended, priority)
@@ -86,19 +80,11 @@ class Dispatch:
         self,
         order: SearchOrder,
         on_progress: Callable[[float], None],
-        on_end: Callable[[SearchResult | SnapFailure], None],
+        on_end: Callable[[Proposals | SnapError], None],
     ) -> Callable[[], None]:
         """Let a worker look where the object may be; returns a function that cancels it."""
-
-        def ended(outcome: Proposals | SnapError) -> None:
-            if isinstance(outcome, SnapError):
-                on_end(SnapFailure(str(outcome)))
-                return
-            made_by = __version__, outcome.algorithm, outcome.hardware
-            on_end(SearchResult(outcome.hypotheses, outcome.seconds, *made_by))
-
         model = self._sought.present.model
-        return self._snapper.request(self._search_job(order, model), model, on_progress, ended)
+        return self._snapper.request(self._search_job(order, model), model, on_progress, on_end)
 
     def _snap_job(self, order: SnapOrder, model: ObjectModel) -> SnapJob:
         T_shown_world = pose.inverse(np.array(self._frames[order.frame_id].T_world_camera))

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.workers.jobs import ImageJob, Tell, hardware
+from app.workers.jobs import ImageJob, Tell
 from registration_core import ALGORITHM, snap_steps
+from registration_core.hardware import hardware
 from registration_core.search.viewpoint_model import ViewpointModel
 
 Array = NDArray[np.float64]

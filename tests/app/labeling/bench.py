@@ -11,11 +11,13 @@ from app.labeling.permissions import Wanted
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState
-from app.labeling.snaps.find import SearchOrder, SearchResult
+from app.labeling.snaps.find import SearchOrder
 from app.labeling.snaps.request import Submit
-from app.labeling.snaps.snap_exchange import SnapFailure, SnapFrames, SnapOrder, SnapResult
+from app.labeling.snaps.snap_exchange import SnapFrames, SnapOrder, SnapResult
 from app.storage.event_log import NewEvent
 from app.storage.tables import Condition, EstimateRow, Method
+from app.workers.jobs import Proposals
+from app.workers.pool import SnapError
 from registration_core import Ambiguity, Certificates, Check, Estimate, Hypothesis
 from registration_core.geometry import pose
 
@@ -58,7 +60,7 @@ class RequestedSnap:
 
     order: SnapOrder
     progress: Callable[[float], None]
-    end: Callable[[SnapResult | SnapFailure], None]
+    end: Callable[[SnapResult | SnapError], None]
     cancelled: bool = False
 
     def cancel(self) -> None:
@@ -75,7 +77,7 @@ class Workers:
         self,
         order: SnapOrder,
         on_progress: Callable[[float], None],
-        on_end: Callable[[SnapResult | SnapFailure], None],
+        on_end: Callable[[SnapResult | SnapError], None],
     ) -> Callable[[], None]:
         self.snaps.append(RequestedSnap(order, on_progress, on_end))
         return self.snaps[-1].cancel
@@ -87,7 +89,7 @@ class RequestedSearch:
 
     order: SearchOrder
     progress: Callable[[float], None]
-    end: Callable[[SearchResult | SnapFailure], None]
+    end: Callable[[Proposals | SnapError], None]
     cancelled: bool = False
 
     def cancel(self) -> None:
@@ -104,7 +106,7 @@ class Searchers:
         self,
         order: SearchOrder,
         on_progress: Callable[[float], None],
-        on_end: Callable[[SearchResult | SnapFailure], None],
+        on_end: Callable[[Proposals | SnapError], None],
     ) -> Callable[[], None]:
         self.searches.append(RequestedSearch(order, on_progress, on_end))
         return self.searches[-1].cancel
@@ -135,8 +137,9 @@ def result(
         certificates=certificates,
         ambiguities=(Ambiguity("free motion", "turn", (0.0, 0.0, 1.0), 0.4),),
         seed=5,
+        hardware="a test machine",
     )
-    return SnapResult(estimate, T, 3, thought(verdict, confidence), "1.2.3", "a test machine")
+    return SnapResult(estimate, T, 3, thought(verdict, confidence))
 
 
 class Bench:

@@ -55,8 +55,8 @@ def run(client: Client, address: str, function: Any, *arguments: Any) -> Any:
 def test_it_finds_what_the_library_finds(client, addresses, model, content, config):
     job = new_job(model, config=config)
     result = run(client, addresses[0], jobs.run_job, job, content)
-    assert_same(result.estimate, done_here(job, model))
-    assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
+    assert_same(result, done_here(job, model))
+    assert np.linalg.norm(result.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.01
     assert result.hardware
 
 
@@ -64,8 +64,8 @@ def test_it_passes_by_what_it_is_told_of(client, addresses, model, content):
     everything = replace(view_of(DEPTH, CAMERA), explained=np.ones(DEPTH.shape, dtype=np.bool_))
     job = new_job(model, views=(everything,))
     result = run(client, addresses[0], jobs.run_job, job, content)
-    assert np.allclose(result.estimate.T_camera_object, job.T_camera_object)
-    assert not result.estimate.converged
+    assert np.allclose(result.T_camera_object, job.T_camera_object)
+    assert not result.converged
 
 
 @pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])
@@ -75,8 +75,8 @@ def test_it_searches_as_far_as_it_is_told(client, addresses, model, content, met
     for spread in (None, (0.006, 0.1), (0.06, 1.0)):
         job = new_job(model, config=config, start_spread=spread)
         result = run(client, addresses[0], jobs.run_job, job, content)
-        assert_same(result.estimate, done_here(job, model))
-        found.append(result.estimate.confidence)
+        assert_same(result, done_here(job, model))
+        found.append(result.confidence)
     assert len(set(found)) == 3
 
 
@@ -112,7 +112,7 @@ def test_what_a_worker_builds_serves_all(client, addresses, model):
     client.run(jobs.keep, model.content_hash, built, workers=[there])
     for address in addresses:
         result = run(client, address, jobs.run_job, new_job(model), None)
-        assert_same(result.estimate, done_here(new_job(model), model))
+        assert_same(result, done_here(new_job(model), model))
 
 
 def test_progress_is_told_by_snap(client, addresses, model, content):

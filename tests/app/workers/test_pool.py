@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from distributed import Nanny, Scheduler, Worker
 
-from app.workers.jobs import JobResult, SnapJob
+from app.workers.jobs import SnapJob
 from app.workers.pool import DIED, SnapError, Snapper
-from registration_core import ObjectModel, SnapConfig, region_of_interest
+from registration_core import Estimate, ObjectModel, SnapConfig, region_of_interest
 from tests.app.export.site import CAMERA
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import (
@@ -102,9 +102,9 @@ def test_it_finds_what_the_library_finds_on_the_whole_image(snapper, model):
     job = new_job(model, snapper.topic, views=(view_of(crop, camera.cropped(left, top, width, height)),))
     outcome, _ = request(snapper, job, model)
     result = result_of(outcome)
-    assert isinstance(result, JobResult)
-    assert_same(result.estimate, done_here(new_job(model, views=(view_of(image, camera),)), model))
-    assert np.linalg.norm(result.estimate.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.005
+    assert isinstance(result, Estimate)
+    assert_same(result, done_here(new_job(model, views=(view_of(image, camera),)), model))
+    assert np.linalg.norm(result.T_camera_object[:3, 3] - T_CAMERA_TOOL[:3, 3]) < 0.005
 
 
 def test_progress_arrives_while_it_runs(snapper, model):
@@ -123,7 +123,7 @@ def test_a_cancelled_snap_brings_nothing_and_its_worker_is_free_at_once(snapper,
     wait_until(lambda: busy(snapper) == 0, "the worker to stop")
     count = len(outcome.shares)
     other, _ = request(snapper, new_job(model, snapper.topic), model)
-    assert isinstance(result_of(other), JobResult)
+    assert isinstance(result_of(other), Estimate)
     assert len(outcome.shares) == count and outcome.ends == []
     cancel()  # once more does no harm
 
@@ -135,7 +135,7 @@ def test_cancelling_one_of_many_lets_the_next_begin(snapper, model):
     last, _ = request(snapper, new_job(model, snapper.topic), model)
     cancel_waiting()
     running[0][1]()
-    assert isinstance(result_of(last), JobResult)
+    assert isinstance(result_of(last), Estimate)
     assert waiting.shares == [] and not running[1][0].ended.is_set()
     running[1][1]()
     wait_until(lambda: busy(snapper) == 0, "the workers to stop")
@@ -158,8 +158,8 @@ def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> No
     order: list[str] = []
     told = Outcome()
 
-    def note(name: str) -> Callable[[JobResult | SnapError], None]:
-        def on_end(outcome: JobResult | SnapError) -> None:
+    def note(name: str) -> Callable[[Estimate | SnapError], None]:
+        def on_end(outcome: Estimate | SnapError) -> None:
             order.append(name)
             if len(order) == 2:
                 told.on_end(outcome)
@@ -171,7 +171,7 @@ def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> No
         snapper.request(job, model, told.on_progress, note(name), priority)
         wait_until(partial(handed_over, snapper, job), "the snap to be handed over")
     cancel()
-    assert isinstance(result_of(told), JobResult)
+    assert isinstance(result_of(told), Estimate)
     assert order == ["asked for", "live"] and told.shares == []
 
 
@@ -206,7 +206,7 @@ def test_a_snap_that_waits_for_its_object_says_so(snapper, model):
     assert snapper.built(unknown) is built
     for _, cancel in held:
         cancel()
-    assert isinstance(result_of(outcome), JobResult) and built.done()
+    assert isinstance(result_of(outcome), Estimate) and built.done()
 
 
 def test_workers_outlast_a_sleep_of_the_machine(snapper):
@@ -225,7 +225,7 @@ def test_an_object_that_no_worker_knows_is_sent_along(snapper):
     unknown = new_model()
     assert knowing(snapper, unknown.content_hash) == 0
     outcome, _ = request(snapper, new_job(unknown, snapper.topic), unknown)
-    assert isinstance(result_of(outcome), JobResult)
+    assert isinstance(result_of(outcome), Estimate)
     assert knowing(snapper, unknown.content_hash) in (1, 2)  # the one that built it, and the one that snapped
 
 
@@ -262,7 +262,7 @@ def test_a_worker_that_dies_in_mid_snap_fails_that_snap_only(snapper, model):
     assert isinstance(end, SnapError) and str(end) == DIED
     for _ in range(3):
         outcome, _ = request(snapper, new_job(model, snapper.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
+        assert isinstance(result_of(outcome), Estimate)
     wait_until(lambda: snapper.worker_count() == 2, "another worker in its place")
 
 
@@ -276,8 +276,8 @@ def test_what_was_built_is_never_built_again(tmp_path):
         forbid_building(second)
         outcome, _ = request(second, new_job(model, second.topic), model)
         result = result_of(outcome)
-        assert isinstance(result, JobResult)
-        assert_same(result.estimate, done_here(new_job(model), model))
+        assert isinstance(result, Estimate)
+        assert_same(result, done_here(new_job(model), model))
         other = new_model()
         outcome, _ = request(second, new_job(other, second.topic), other)
         assert isinstance(result_of(outcome), SnapError)  # so building was forbidden indeed

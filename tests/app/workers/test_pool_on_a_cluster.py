@@ -11,9 +11,8 @@ import dask
 import pytest
 from distributed import Client, Worker
 
-from app.workers.jobs import JobResult
 from app.workers.pool import UNREACHABLE, SnapError, Snapper
-from registration_core import ObjectModel, SnapConfig
+from registration_core import Estimate, ObjectModel, SnapConfig
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import knowing, new_job, new_model, pids, request, result_of, store_in
 from tests.app.waiting import LONGEST, wait_until
@@ -40,7 +39,7 @@ def test_workers_of_a_cluster_get_what_one_of_them_built(cluster, tmp_path):
     with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
         model, other = new_model(), new_model()
         outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
+        assert isinstance(result_of(outcome), Estimate)
         assert knowing(elsewhere, model.content_hash) in (1, 2)
         elsewhere.hand_over([model.content_hash, other.content_hash])
         assert knowing(elsewhere, model.content_hash) == 2 and knowing(elsewhere, other.content_hash) == 0
@@ -108,7 +107,7 @@ def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
         )
         model = new_model()
         outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
-        assert isinstance(result_of(outcome), JobResult)
+        assert isinstance(result_of(outcome), Estimate)
     assert waited_in == ["results"] * 3  # the object was not known, is built, and the snap is done
 
 

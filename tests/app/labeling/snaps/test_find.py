@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from app.labeling.moves.pose_record import ActionError
-from app.labeling.snaps.find import SearchResult
-from app.labeling.snaps.snap_exchange import SnapFailure
 from app.storage.roles import Actor
+from app.workers.jobs import Proposals
+from app.workers.pool import SnapError
 from registration_core import Hypothesis, SnapConfig
 from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted
 
-FOUND = SearchResult(
-    (Hypothesis(START, 0.75), Hypothesis(shifted(0.1), 0.25)), 0.2, "1.2.3", "0123456789ab", "a test machine"
+FOUND = Proposals(
+    (Hypothesis(START, 0.75), Hypothesis(shifted(0.1), 0.25)), 0.2, "0123456789ab", "a test machine"
 )
 
 
@@ -63,7 +63,7 @@ def test_a_search_is_cancelled_and_its_candidates_are_put_away(bench):
 
 def test_a_failed_search_says_why(bench):
     bench.session.search(Actor.HUMAN)
-    bench.searchers.searches[0].end(SnapFailure("The worker died."))
+    bench.searchers.searches[0].end(SnapError("The worker died."))
     assert (bench.state.search.state, bench.state.search.message) == ("failed", "The worker died.")
     assert bench.log.events[-1].detail == {"message": "The worker died."}
 

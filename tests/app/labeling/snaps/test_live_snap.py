@@ -9,8 +9,9 @@ import pytest
 from app.labeling.moves.pose_record import ActionError
 from app.labeling.session_state import SessionState
 from app.labeling.snaps.machine import LIVE_SEED
-from app.labeling.snaps.snap_exchange import SnapFailure, SnapOrder, SnapResult
+from app.labeling.snaps.snap_exchange import SnapOrder, SnapResult
 from app.storage.roles import Actor
+from app.workers.pool import SnapError
 from registration_core import SnapConfig
 from tests.app.labeling.bench import FRAMES, START, Bench, RequestedSnap, result, shifted
 from tests.app.waiting import LONGEST
@@ -80,7 +81,7 @@ def test_a_look_starts_from_where_the_object_is_and_shows_where_a_snap_would_lan
     assert order.start_spread == pytest.approx((0.06, SnapConfig().spread.rotation))
     newest(live).end(result(shifted(0.3), 0.7))
     assert np.array_equal(live.state.live.T_world_object, shifted(0.3))
-    assert live.state.live.confidence == 0.7
+    assert live.state.live.assessment.confidence == 0.7
     assert np.array_equal(live.state.T_world_object, shifted(0.1))
     assert live.log.events == [] and live.log.estimates == []
 
@@ -123,7 +124,7 @@ def test_a_look_that_fails_shows_nothing_and_is_not_tried_again_from_there(live)
     newest(live).end(result(shifted(0.3)))
     live.drag(shifted(0.2))
     count = len(live.workers.snaps)
-    newest(live).end(SnapFailure("outside the image"))
+    newest(live).end(SnapError("outside the image"))
     assert live.state.live is None and live.state.snap is None
     assert len(live.workers.snaps) == count
     live.drag(shifted(0.25))
@@ -135,7 +136,7 @@ def test_a_look_that_fails_at_once_is_survived():
 
     def refuse(order, on_progress, on_end):
         orders.append(order)
-        on_end(SnapFailure("out of view"))
+        on_end(SnapError("out of view"))
         return lambda: None
 
     bench = Bench(request_snap=refuse)
@@ -254,7 +255,7 @@ class BusyWorkers:
         self,
         order: SnapOrder,
         on_progress: Callable[[float], None],
-        on_end: Callable[[SnapResult | SnapFailure], None],
+        on_end: Callable[[SnapResult | SnapError], None],
     ) -> Callable[[], None]:
         with self._count:
             self.orders.append(order)

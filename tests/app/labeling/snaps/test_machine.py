@@ -5,8 +5,8 @@ import pytest
 
 from app.labeling.moves.pose_record import ActionError
 from app.labeling.snaps.machine import MOVED_ON, TAKEN_BACK
-from app.labeling.snaps.snap_exchange import SnapFailure
 from app.storage.roles import Actor
+from app.workers.pool import SnapError
 from registration_core import SnapConfig
 from tests.app.labeling.bench import FRAMES, START, Bench, result, shifted, thought
 
@@ -78,7 +78,7 @@ def test_a_machine_that_is_not_to_be_accepted_offers_quietly_and_says_why(auto, 
     assert auto.state.offer.withheld == auto.log.events[-1].detail["withheld"] == f"{verdict}: because"
     assert auto.state.offer.assessment.verdict == verdict
     assert np.array_equal(auto.state.T_world_object, shifted(0.1))
-    assert auto.state.offer.quiet and auto.state.offer.confidence == UNSURE
+    assert auto.state.offer.quiet and auto.state.offer.assessment.confidence == UNSURE
     assert (auto.log.kinds[-1], auto.log.events[-1].actor) == ("snap_offered", Actor.MACHINE)
     auto.session.accept(Actor.HUMAN)
     assert np.array_equal(auto.state.T_world_object, shifted(0.2))
@@ -140,7 +140,7 @@ def test_a_drag_that_cannot_be_saved_gives_the_machine_no_turn(auto):
 
 def test_a_turn_that_comes_to_nothing_leaves_the_drag(auto):
     auto.drag(shifted(0.1))
-    auto.workers.snaps[0].end(SnapFailure("outside the image"))
+    auto.workers.snaps[0].end(SnapError("outside the image"))
     assert auto.log.kinds == ["drag", "snap_requested", "snap_failed"]
     assert np.array_equal(auto.state.T_world_object, shifted(0.1))
 

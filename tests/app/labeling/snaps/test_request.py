@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 import pytest
 
 from app.labeling.snaps.request import Request
-from app.labeling.snaps.snap_exchange import FramesReport, SnapFailure, SnapStatus
+from app.labeling.snaps.snap_exchange import FramesReport, SnapStatus
 from app.storage.roles import Actor
+from app.workers.pool import SnapError
 
 FRAMES = FramesReport(2, 1, 1)
-Outcome = int | SnapFailure
+Outcome = int | SnapError
 
 
 @dataclass
@@ -53,7 +54,7 @@ def start(request_: Request[str, int], settled: list[Outcome]) -> Callable[[str]
         def settle(outcome: Outcome) -> FramesReport | None:
             assert request_.status is not None and request_.status.is_live, "written down before it is told"
             settled.append(outcome)
-            return None if isinstance(outcome, SnapFailure) else FRAMES
+            return None if isinstance(outcome, SnapError) else FRAMES
 
         request_.start(order, SnapStatus(order, Actor.HUMAN), settle)
 
@@ -76,7 +77,7 @@ def test_a_result_ends_it(request_, workers, start, settled):
 
 def test_a_failure_is_told_in_its_words(request_, workers, start, settled):
     start("a")
-    workers.end[0](SnapFailure("The worker died."))
+    workers.end[0](SnapError("The worker died."))
     assert (request_.status.state, request_.status.message) == ("failed", "The worker died.")
     assert len(settled) == 1
 
@@ -91,7 +92,7 @@ def test_an_older_one_brings_nothing(request_, workers, start, settled):
 
 
 def test_one_that_ends_while_it_is_handed_over_is_not_cancelled_later(request_, workers, start):
-    workers.at_once = SnapFailure("Nothing was measured.")
+    workers.at_once = SnapError("Nothing was measured.")
     start("a")
     assert request_.status.state == "failed" and not request_.is_under_way
     request_.drop()

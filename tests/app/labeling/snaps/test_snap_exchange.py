@@ -6,9 +6,11 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from app import __version__
 from app.labeling.moves.pose_record import ActionError
-from app.labeling.snaps.snap_exchange import FramesReport, SnapFailure, SnapFrames
+from app.labeling.snaps.snap_exchange import FramesReport, SnapFrames
 from app.storage.roles import Actor
+from app.workers.pool import SnapError
 from registration_core import ALGORITHM, SnapConfig
 from registration_core.judge.certificates import NOTHING
 from tests.app.labeling.bench import CHECK, FRAMES, PIVOT, START, SURE, Bench, result, shifted, thought
@@ -49,7 +51,7 @@ def test_a_snap_is_applied_with_its_estimate(bench):
     }
     (row,) = bench.log.estimates
     assert (row.snap_id, row.registration_id, row.frame_id, row.seed) == (snap_id, 7, FRAMES[0], 42)
-    assert (row.version, row.hardware, row.seconds) == ("1.2.3", "a test machine", 0.25)
+    assert (row.version, row.hardware, row.seconds) == (__version__, "a test machine", 0.25)
     assert row.algorithm == ALGORITHM
     assert row.config == SnapConfig.paper().to_dict() and row.start_spread is None
     assert row.hypotheses[1] == {"T_camera_object": START.tolist(), "weight": 0.3}
@@ -193,7 +195,7 @@ def test_a_result_is_offered_where_the_object_was_moved_meanwhile(bench, move):
     where = bench.state.T_world_object
     bench.workers.snaps[0].end(result(shifted(0.5), 0.6))
     assert np.array_equal(bench.state.T_world_object, where)
-    assert bench.state.offer.snap_id == snap_id and bench.state.offer.confidence == 0.6
+    assert bench.state.offer.snap_id == snap_id and bench.state.offer.assessment.confidence == 0.6
     assert np.array_equal(bench.state.offer.T_world_object, shifted(0.5))
     assert bench.state.snap.state == "done"
     assert bench.log.kinds[-1] == "snap_offered"
@@ -302,7 +304,7 @@ def test_a_cancel_that_cannot_be_recorded_leaves_the_snap_alone(bench):
 
 def test_a_failed_snap_says_why_and_another_may_follow(bench):
     bench.session.snap(Actor.HUMAN)
-    bench.workers.snaps[0].end(SnapFailure("The worker died."))
+    bench.workers.snaps[0].end(SnapError("The worker died."))
     assert (bench.state.snap.state, bench.state.snap.message) == ("failed", "The worker died.")
     failed = bench.log.events[-1]
     assert (failed.kind, failed.actor) == ("snap_failed", Actor.MACHINE)
@@ -313,7 +315,7 @@ def test_a_failed_snap_says_why_and_another_may_follow(bench):
 
 def test_a_failure_that_comes_at_once_is_told_too():
     def refuse(order, on_progress, on_end):
-        on_end(SnapFailure("out of view"))
+        on_end(SnapError("out of view"))
         return lambda: None
 
     bench = Bench(request_snap=refuse)
