@@ -1,6 +1,7 @@
 """The focus: its ring is seen on light and dark, Esc leads it to the 3-D view, and a notice keeps it."""
 
 from collections.abc import Callable
+from typing import Literal
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -34,6 +35,7 @@ CONTRAST = """node => {
     .toSorted((a, b) => b - a);
   return (one + 0.05) / (other + 0.05);
 }"""
+PARTS = ("#help", "[data-layer=cloud]", "[data-look=top]", "#zoom-in", "#submit", "#frame-next")
 HAS_FOCUS = "id => document.activeElement.id === id"
 
 
@@ -47,20 +49,17 @@ def labelling(
     return labelling
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_ring_is_seen_wherever_it_is(
-    server: Server, open_page: Callable[[str], Page], scheme: str
-) -> None:
-    labelling = LabellingPage(open_page(server.new_link(f"ring {scheme}")), server)
+def test_the_ring_is_seen_wherever_it_is(labelling: LabellingPage) -> None:
     page = labelling.page
-    page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
-    expect(page.locator("#submit")).to_be_enabled()
     page.keyboard.press("Shift")  # the keyboard is in use
-    for selector in ("#help", "[data-layer=cloud]", "[data-look=top]", "#zoom-in", "#submit", "#frame-next"):
-        node = page.locator(selector)
-        node.focus()
-        assert node.evaluate(CONTRAST) >= LEAST_CONTRAST, (scheme, selector)
-    take_picture(page, f"focus-{scheme}")
+    schemes: tuple[Literal["light", "dark"], ...] = ("light", "dark")
+    for scheme in schemes:
+        page.emulate_media(color_scheme=scheme)
+        for selector in PARTS:
+            node = page.locator(selector)
+            node.focus()
+            assert node.evaluate(CONTRAST) >= LEAST_CONTRAST, (scheme, selector)
+        take_picture(page, f"focus-{scheme}")
 
 
 def test_the_view_shows_that_it_has_the_focus_and_esc_leads_to_it(labelling: LabellingPage) -> None:
