@@ -5,9 +5,15 @@ import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from app.storage.tables import Condition
+from registration_core.geometry import pose
+from tests.e2e.demo_truth import true_pose
+from tests.e2e.gizmo import wait_for_picture
+from tests.e2e.labelling_page import LabellingPage, OpenLabelling
 from tests.processes import Server, serving
 
 CHROMIUM = os.environ.get("SNAP6D_CHROMIUM", "/usr/bin/chromium")
@@ -29,6 +35,8 @@ SHOWN_AROUND = """if (location.protocol !== "about:" && !localStorage["snap6d.gu
 """Everybody has seen the guide."""
 DRAWN_FINELY = """if (location.protocol !== "about:") localStorage["snap6d.layers"] ??= '{"fine": true}'"""
 """Somebody wants all measured points, though software has to draw them."""
+SURE = "box"
+"""An object of the demo scenes that the machine is sure of."""
 LONGEST_MS = 90_000
 """That anything may take on a machine that is busy with others."""
 PICTURES = os.environ.get("SNAP6D_PICTURES")
@@ -82,6 +90,26 @@ def open_page(browser: Browser) -> Iterator[Callable[[str], Page]]:
     for context in contexts:
         context.close()
     assert problems == []
+
+
+@pytest.fixture
+def open_labelling(
+    server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest
+) -> OpenLabelling:
+    """Opens a new task of an administrator, with the object roughly where it belongs."""
+
+    def open_one(condition: Condition) -> LabellingPage:
+        name = request.node.name.replace("_", "-")[:60]
+        labelling = LabellingPage(open_page(server.new_link(name, "admin")), server, SURE, condition)
+        truth = true_pose(labelling.task["object"]["obj_id"])
+        roughly = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
+        put = labelling.page.request.put(f"{labelling.url}/pose", data={"T_world_object": roughly.tolist()})
+        assert put.ok
+        expect(labelling.page.locator("#undo")).to_be_enabled()
+        wait_for_picture(labelling.frame)
+        return labelling
+
+    return open_one
 
 
 def drawing_finely(page: Page) -> Page:

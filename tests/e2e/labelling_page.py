@@ -135,6 +135,10 @@ class LabellingPage:
         return event
 
 
+OpenLabelling = Callable[[Condition], LabellingPage]
+"""Opens a new task under a condition; see the fixture `open_labelling`."""
+
+
 def scale_of_gizmo(page: Page) -> float:
     """Of the task that the page shows, metres."""
     root, _, task_id = page.url.rpartition("/label/")

@@ -1,33 +1,23 @@
 """The colour image of the labelling page: the outline on it, zoom, blend, and a browser without WebGL."""
 
-import base64
-import io
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import PIL.Image
 import pytest
-from numpy.typing import NDArray
 from playwright.sync_api import Browser, expect
 
-from registration_core import Intrinsics, ObjectModel
 from registration_core.geometry import pose
 from registration_core.rendering.rasterizer import render_depth
 from tests.app.waiting import wait_until
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import wait_for_picture
+from tests.e2e.image_panel import COVERED, ImagePanel, View
 from tests.e2e.labelling_page import LabellingPage
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-PIXELS = "selector => Array.from(document.querySelectorAll(selector), canvas => canvas.toDataURL())"
-VIEW = """() => {
-  const { a, e, f } = new DOMMatrix(getComputedStyle(document.getElementById("color")).transform);
-  return [a, e, f];
-}"""
 NO_WEBGL = """if (window === top) {
   const original = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
@@ -36,98 +26,23 @@ NO_WEBGL = """if (window === top) {
 }"""
 HELD_IN_VIEW = pose.exp([0.01, 0.02, 0.6, 0.5, -0.7, 0.9])
 """T_camera_object of an object before the camera, seen askew."""
-COVERED = 192
-"""Alpha from which on a pixel is the object's, not the rim beside it."""
-
-
-@dataclass(frozen=True)
-class View:
-    """How the image is shown: pixels of the page to one of its own, and where its corner lies in its box."""
-
-    scale: float
-    left: float
-    top: float
-
-    def camera(self, frame: dict, width: int, height: int) -> Intrinsics:
-        """The frame's camera as it belongs to what is shown."""
-        k = frame["intrinsics"]
-        return Intrinsics(
-            width,
-            height,
-            self.scale * k["fx"],
-            self.scale * k["fy"],
-            self.scale * (k["cx"] + 0.5) + self.left - 0.5,
-            self.scale * (k["cy"] + 0.5) + self.top - 0.5,
-        )
-
-
-class Image:
-    """The image in the panel of a labelling page."""
-
-    def __init__(self, labelling: LabellingPage) -> None:
-        self.labelling = labelling
-        self.page = labelling.page
-        get = lambda path: self.page.request.get(f"{labelling.root}{path}")  # noqa: E731
-        self.frames = get(f"/api/scenes/{labelling.task['scene']['id']}").json()["frames"]
-        mesh = get(f"/api/objects/{labelling.task['object']['id']}/mesh.ply").body()
-        self.model = ObjectModel.from_bytes(mesh, "ply", "mm")
-
-    @property
-    def view(self) -> View:
-        return View(*self.page.evaluate(VIEW))
-
-    @property
-    def pixels(self) -> NDArray[np.uint8]:
-        """What is drawn over the image (H, W, 4)."""
-        (drawn,) = self.drawn_on("#outline")
-        return drawn
-
-    def drawn_on(self, selector: str) -> list[NDArray[np.uint8]]:
-        """What is on the canvases (H, W, 4)."""
-        pictures = [base64.b64decode(url.partition(",")[2]) for url in self.page.evaluate(PIXELS, selector)]
-        return [np.array(PIL.Image.open(io.BytesIO(png)).convert("RGBA")) for png in pictures]
-
-    @property
-    def place(self) -> NDArray[np.float64]:
-        """The middle (2,) of what is drawn, pixels; NaN where nothing is."""
-        rows, columns = np.nonzero(self.pixels[..., 3] > COVERED)
-        return np.array([columns.mean(), rows.mean()]) if len(rows) else np.full(2, np.nan)
-
-    def blend(self, share: float) -> None:
-        self.page.locator("#blend").fill(str(share))
-
-    def put(self, T_camera_object: NDArray[np.float64]) -> None:
-        """Put the object somewhere in the first frame."""
-        T_world_object = np.array(self.frames[0]["T_world_camera"]) @ T_camera_object
-        body = {"T_world_object": T_world_object.tolist()}
-        assert self.page.request.put(f"{self.labelling.url}/pose", data=body).ok
-
-    def silhouette(self, T_camera_object: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Where the object is in the first frame as it is shown, by the library."""
-        height, width, _ = self.pixels.shape
-        return render_depth(self.model, self.view.camera(self.frames[0], width, height), T_camera_object) > 0
-
-    def overlap(self, expected: NDArray[np.bool_]) -> float:
-        """Intersection over union of what is drawn and what should be."""
-        drawn = self.pixels[..., 3] > COVERED
-        return float((drawn & expected).sum() / (drawn | expected).sum())
 
 
 @pytest.fixture(scope="module")
-def mug(server: Server, browser: Browser) -> Iterator[Image]:
+def mug(server: Server, browser: Browser) -> Iterator[ImagePanel]:
     """The page of an operator before the mug of the first demo scene."""
     context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
     problems: list[str] = []
     page = context.new_page()
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.goto(server.new_link("operator of images"))
-    yield Image(LabellingPage(page, server, "mug"))
+    yield ImagePanel(LabellingPage(page, server, "mug"))
     context.close()
     assert problems == []
 
 
 @pytest.fixture
-def image(mug: Image) -> Image:
+def image(mug: ImagePanel) -> ImagePanel:
     """The same page with the object before the camera, all of the image, and the outline alone."""
     mug.put(HELD_IN_VIEW)
     mug.blend(0.0)
@@ -141,7 +56,7 @@ def image(mug: Image) -> Image:
     return mug
 
 
-def test_what_is_drawn_is_what_the_library_renders(image: Image) -> None:
+def test_what_is_drawn_is_what_the_library_renders(image: ImagePanel) -> None:
     image.blend(1.0)
     expected = image.silhouette(HELD_IN_VIEW)
     assert expected.sum() > 500
@@ -155,7 +70,7 @@ def test_what_is_drawn_is_what_the_library_renders(image: Image) -> None:
     assert np.allclose(image.place, [columns.mean(), rows.mean()], atol=0.25)
 
 
-def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
+def test_the_outline_goes_with_a_drag_while_it_lasts(image: ImagePanel) -> None:
     labelling, page = image.labelling, image.page
     assert page.request.post(f"{labelling.url}/reset").ok
     wait_for_picture(labelling.frame)
@@ -175,7 +90,7 @@ def test_the_outline_goes_with_a_drag_while_it_lasts(image: Image) -> None:
     wait_until(lambda: image.overlap(expected) > 0.95, "the outline where the drag ended", 20)
 
 
-def test_blend_goes_from_the_outline_alone_to_the_shape(image: Image) -> None:
+def test_blend_goes_from_the_outline_alone_to_the_shape(image: ImagePanel) -> None:
     image.page.keyboard.press("z")
     wait_until(lambda: image.view.scale > 1, "the image zoomed in")
     wide = image.silhouette(HELD_IN_VIEW)
@@ -196,7 +111,7 @@ def test_blend_goes_from_the_outline_alone_to_the_shape(image: Image) -> None:
     assert 100 < seen[0] < 0.2 * wide.sum() < seen[2]
 
 
-def test_a_key_hides_the_outline_wherever_the_focus_is(image: Image) -> None:
+def test_a_key_hides_the_outline_wherever_the_focus_is(image: ImagePanel) -> None:
     page = image.page
     outline = page.locator("#outline")
     page.locator("#blend").focus()
@@ -210,7 +125,7 @@ def test_a_key_hides_the_outline_wherever_the_focus_is(image: Image) -> None:
     expect(outline).to_be_hidden()
 
 
-def test_zoom_by_wheel_buttons_and_keys(image: Image) -> None:
+def test_zoom_by_wheel_buttons_and_keys(image: ImagePanel) -> None:
     page = image.page
     whole = image.view
     box = page.locator("#image").bounding_box()
@@ -239,7 +154,7 @@ def test_zoom_by_wheel_buttons_and_keys(image: Image) -> None:
     assert image.view == whole
 
 
-def test_the_machine_and_the_human_have_their_colours(image: Image) -> None:
+def test_the_machine_and_the_human_have_their_colours(image: ImagePanel) -> None:
     def is_warm() -> bool:
         pixels = image.pixels
         line = pixels[pixels[..., 3] > 250].astype(int)
@@ -253,7 +168,7 @@ def test_the_machine_and_the_human_have_their_colours(image: Image) -> None:
     take_picture(image.page, "label-outline-snapped")
 
 
-def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: Image) -> None:
+def test_every_frame_of_the_scene_has_a_thumbnail_with_the_outline(image: ImagePanel) -> None:
     page, labelling = image.page, image.labelling
     T_world_object = np.array(labelling.state["T_world_object"])
 
@@ -305,7 +220,7 @@ def test_without_webgl_the_image_is_shown_alone(server: Server, browser: Browser
         context.close()
 
 
-def test_the_image_changes_places_with_the_view(image: Image) -> None:
+def test_the_image_changes_places_with_the_view(image: ImagePanel) -> None:
     page, frame = image.page, image.labelling.frame
 
     def times_as_wide_as_the_view() -> float:

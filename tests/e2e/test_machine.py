@@ -1,35 +1,31 @@
 """The machine as a partner: it takes over in `auto`, shows a ghost while live, and stays away in `manual`."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 from sqlalchemy import select
 
 from app.config import Settings
 from app.storage.database import Database
-from app.storage.tables import CalibrationRow, Condition, Dataset
+from app.storage.tables import CalibrationRow, Dataset
 from registration_core import ALGORITHM
 from registration_core.geometry import pose
 from tests.e2e.conftest import take_picture
 from tests.e2e.demo_truth import true_pose
 from tests.e2e.gizmo import wait_for_picture
-from tests.e2e.labelling_page import GHOST_HIDDEN, GHOST_SHOWN, LabellingPage, hold
+from tests.e2e.labelling_page import GHOST_HIDDEN, GHOST_SHOWN, LabellingPage, OpenLabelling, hold
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-OBJECT = "box"
-"""Of which the machine is sure."""
 
 GIZMO_NEAR = """T => {
   const {x, y, z} = window.__viserMutable.nodeRefFromName["/object"].position;
   return Math.hypot(x - T[0][3], y - T[1][3], z - T[2][3]) < 0.1;
 }"""
 """Whether the gizmo is where an object at this pose has it, whose origin is not far."""
-
-Open = Callable[[Condition], LabellingPage]
 
 
 @pytest.fixture(autouse=True)
@@ -55,30 +51,12 @@ def calibrated(server: Server) -> Iterator[None]:
     database.close()
 
 
-@pytest.fixture
-def open_labelling(server: Server, open_page: Callable[[str], Page], request: pytest.FixtureRequest) -> Open:
-    """Opens a new task under a condition, with the object roughly where it belongs."""
-
-    def open_one(condition: Condition) -> LabellingPage:
-        name = request.node.name.replace("_", "-")[:60]
-        labelling = LabellingPage(open_page(server.new_link(name, "admin")), server, OBJECT, condition)
-        truth = true_pose(labelling.task["object"]["obj_id"])
-        roughly = pose.perturbed(truth, 0.01, np.radians(8), np.random.default_rng(1))
-        put = labelling.page.request.put(f"{labelling.url}/pose", data={"T_world_object": roughly.tolist()})
-        assert put.ok
-        expect(labelling.page.locator("#undo")).to_be_enabled()
-        wait_for_picture(labelling.frame)
-        return labelling
-
-    return open_one
-
-
 def kinds(labelling: LabellingPage) -> list[str]:
     items = labelling.page.request.get(f"{labelling.url}/events?limit=500").json()["items"]
     return [event["kind"] for event in items if event["kind"] != "view"]
 
 
-def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_labelling: Open) -> None:
+def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("auto")
     page = labelling.page
     drag = labelling.drag("tx", 0.01)
@@ -103,7 +81,7 @@ def test_auto_takes_over_after_a_drag_and_undo_takes_it_back(open_labelling: Ope
     expect(page.locator("#note")).to_be_hidden()
 
 
-def test_what_was_taken_back_in_auto_is_only_suggested(open_labelling: Open) -> None:
+def test_what_was_taken_back_in_auto_is_only_suggested(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("auto")
     page = labelling.page
     labelling.drag("tx", 0.01)
@@ -124,7 +102,7 @@ def test_what_was_taken_back_in_auto_is_only_suggested(open_labelling: Open) -> 
     labelling.frame.wait_for_function(GHOST_HIDDEN)
 
 
-def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_labelling: Open) -> None:
+def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("snap")
     page = labelling.page
     page.keyboard.press("v")
@@ -153,7 +131,7 @@ def test_the_live_ghost_appears_in_a_drag_and_is_accepted_by_a_key(open_labellin
     assert [event["detail"]["on"] for event in labelling.events("live")] == [True, False]
 
 
-def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_labelling: Open) -> None:
+def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("snap")
     page = labelling.page
     page.locator("#live").click()
@@ -168,7 +146,7 @@ def test_the_ghost_is_accepted_with_the_object_still_in_the_hand(open_labelling:
     assert kinds(labelling)[-2:] == ["drag", "accept"]
 
 
-def test_manual_shows_no_machine(open_labelling: Open) -> None:
+def test_manual_shows_no_machine(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("manual")
     page = labelling.page
     for hidden in ("#snap", "#cancel", "#live", "#confidence", "#note", "#offer"):
@@ -185,7 +163,7 @@ def test_manual_shows_no_machine(open_labelling: Open) -> None:
     expect(page.get_by_text("Snap", exact=True)).to_be_hidden()
 
 
-def test_a_pose_to_look_at_says_why_in_words(open_labelling: Open) -> None:
+def test_a_pose_to_look_at_says_why_in_words(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("snap")
     page = labelling.page
     risk = f"{labelling.root}/api/datasets/{labelling.task['dataset']['id']}/risk"

@@ -7,16 +7,13 @@ from playwright.sync_api import Page, expect
 
 from app.storage.tables import Condition
 from tests.e2e.conftest import take_picture
-from tests.e2e.labelling_page import LabellingPage
-from tests.e2e.test_machine import Open, open_labelling
+from tests.e2e.labelling_page import LabellingPage, OpenLabelling
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
 
-__all__ = ["open_labelling"]
 
-
-def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_labelling: Open) -> None:
+def test_the_papers_filter_is_chosen_cancelled_and_waited_for(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("snap")
     page = labelling.page
     method, status = page.locator("#method"), page.locator("#snap-status")

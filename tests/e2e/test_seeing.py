@@ -16,8 +16,8 @@ from tests.app.waiting import LONGEST, wait_until
 from tests.e2e.conftest import DRAWN_FINELY, take_picture
 from tests.e2e.demo_truth import true_pose
 from tests.e2e.gizmo import view_frame, wait_for_picture
+from tests.e2e.image_panel import ImagePanel
 from tests.e2e.labelling_page import LabellingPage
-from tests.e2e.test_image import Image
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
@@ -45,7 +45,7 @@ FARTHER = pose.exp([0.0, 0.0, 0.3, 0.0, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
-def image(server: Server, browser: Browser) -> Iterator[Image]:
+def image(server: Server, browser: Browser) -> Iterator[ImagePanel]:
     """The page of an operator before the mug of the first demo scene."""
     context = browser.new_context(viewport={"width": 1366, "height": 768}, reduced_motion="reduce")
     context.add_init_script(COUNT_REDRAWS)
@@ -54,12 +54,12 @@ def image(server: Server, browser: Browser) -> Iterator[Image]:
     page = context.new_page()
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.goto(server.new_link("operator who looks"))
-    yield Image(LabellingPage(page, server, "mug"))
+    yield ImagePanel(LabellingPage(page, server, "mug"))
     context.close()
     assert problems == []
 
 
-def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
+def test_the_outline_is_redrawn_all_through_a_drag(image: ImagePanel) -> None:
     labelling, page = image.labelling, image.page
     start, end = labelling.take_hold("tz", 0.08)
     wait_until(lambda: labelling.state["dragging"], "the drag")
@@ -76,7 +76,7 @@ def test_the_outline_is_redrawn_all_through_a_drag(image: Image) -> None:
     assert redraws >= 5
 
 
-def dominant(image: Image) -> str:
+def dominant(image: ImagePanel) -> str:
     """The verdict whose colour most of the object has on the image."""
     colors = {"match": (38, 173, 140), "in_front": (255, 233, 72), "behind": (151, 84, 255)}
     pixels = image.pixels
@@ -91,11 +91,11 @@ def dominant(image: Image) -> str:
     return max(unit, key=lambda name: float(unit[name] @ seen))
 
 
-def is_dominant(image: Image, verdict: str) -> bool:
+def is_dominant(image: ImagePanel, verdict: str) -> bool:
     return dominant(image) == verdict
 
 
-def test_depth_agreement_is_seen_in_colours_and_numbers(image: Image) -> None:
+def test_depth_agreement_is_seen_in_colours_and_numbers(image: ImagePanel) -> None:
     labelling, page = image.labelling, image.page
     T_world_camera = np.array(image.frames[0]["T_world_camera"])
     truth = pose.inverse(T_world_camera) @ true_pose(labelling.task["object"]["obj_id"])
@@ -149,7 +149,7 @@ def test_software_draws_few_points_unless_all_are_asked_for(
 HIDDEN = {"cloud": False, "mesh": False, "texture": True, "fine": True, "agreement": False}
 
 
-def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: Image) -> None:
+def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: ImagePanel) -> None:
     labelling, page = image.labelling, image.page
     texture = page.get_by_role("button", name="Texture")
     expect(texture).to_have_attribute("aria-pressed", "true")
@@ -174,7 +174,7 @@ def test_the_object_is_shown_in_its_own_colours_or_in_the_operators(image: Image
     frame.wait_for_function(IS_DRAWN, arg="/object/textured")
 
 
-def test_cloud_and_mesh_are_put_away_and_stay_so(image: Image) -> None:
+def test_cloud_and_mesh_are_put_away_and_stay_so(image: ImagePanel) -> None:
     labelling, page = image.labelling, image.page
     assert page.request.post(f"{labelling.url}/reset").ok
     page.keyboard.press("b")

@@ -7,13 +7,10 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.conftest import take_picture
-from tests.e2e.labelling_page import LabellingPage
-from tests.e2e.test_machine import Open, open_labelling
+from tests.e2e.labelling_page import LabellingPage, OpenLabelling
 from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
-
-__all__ = ["open_labelling"]
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +20,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield running
 
 
-def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_labelling: Open) -> None:
+def test_a_snap_says_how_many_frames_it_used_and_a_key_keeps_it_to_one(open_labelling: OpenLabelling) -> None:
     labelling = open_labelling("snap")
     page = labelling.page
     only, status = page.locator("#this-frame-only"), page.locator("#snap-status")

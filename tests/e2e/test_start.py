@@ -18,7 +18,7 @@ from registration_core.bop.images import read_depth
 from registration_core.geometry import pose
 from tests.e2e.conftest import drawing_finely, take_picture
 from tests.e2e.gizmo import pixel
-from tests.e2e.test_precision import DEMO, MODEL, PreciseLabellingPage, true_pose
+from tests.e2e.precise_labelling_page import DEMO, MODEL, PreciseLabellingPage, true_pose
 from tests.processes import Server
 
 pytestmark = pytest.mark.e2e
