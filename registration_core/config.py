@@ -1,35 +1,50 @@
 """The constants of a snap that can be set, in small nested records with a default for each."""
 
+import reprlib
 from dataclasses import dataclass, field
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
-from registration_core.config_values import merged, plain
+import msgspec
+
+from registration_core.config_values import (
+    Count,
+    Items,
+    NotNegative,
+    Number,
+    Positive,
+    as_many_as,
+    at_most,
+    converted,
+    overlaid,
+)
 from registration_core.fitted import FITTED
+
+Method = Literal["viewpoint", "particle_filter"]
 
 
 @dataclass(frozen=True)
 class ObservationConfig:
     """How the depth image around the start is read."""
 
-    reach: float = 0.17
+    reach: NotNegative = 0.17
     """How far beyond the object at the start a snap looks, metres."""
-    pixels_across: int = 30
+    pixels_across: Count = 30
     """The image is reduced (by 2 or 4) as long as the object's diameter still spans this many pixels."""
-    depth_gap: float = 0.015
+    depth_gap: Positive = 0.015
     """Neighbouring pixels farther apart than this lie on different surfaces, metres."""
-    normal_radius: int = 2
+    normal_radius: Annotated[int, at_most(16)] = 2
     """Normals are fitted to (2r + 1)^2 pixels."""
-    plane_tolerance: float = 0.008
+    plane_tolerance: Positive = 0.008
     """Pixels closer than this to the supporting plane belong to it, metres."""
-    plane_share: float = 0.15
+    plane_share: Number = 0.15
     """A plane counts as one only if it holds this share of the pixels, ..."""
-    plane_excess: float = 1.5
+    plane_excess: Number = 1.5
     """... and this many times the object's silhouette: in a masked image a flat side of it is no support."""
-    plane_weight: float = 0.1
+    plane_weight: NotNegative = 0.1
     """What a plane pixel weighs, 1 for the others: not 0, for a flat object lies in its plane."""
-    plane_trials: int = 60
+    plane_trials: Annotated[int, at_most(10_000)] = 60
     """RANSAC hypotheses."""
-    min_pixels: int = 40
+    min_pixels: Count = 40
     """With fewer measured pixels about the object there is nothing to register to."""
 
 
@@ -37,13 +52,13 @@ class ObservationConfig:
 class SpreadConfig:
     """How far off the start may be, and how far the search goes."""
 
-    translation: float = 0.04
+    translation: Positive = 0.04
     """Where the caller does not say, metres."""
-    rotation: float = 0.5
+    rotation: Positive = 0.5
     """Where the caller does not say, radians."""
-    search: float = 1.4
+    search: Positive = 1.4
     """Proposals are drawn this many times wider than that."""
-    belief: float = 0.5
+    belief: Positive = 0.5
     """Where the caller does not say, the prior about the start is this much narrower: it may well be good."""
 
 
@@ -51,21 +66,21 @@ class SpreadConfig:
 class ProposalConfig:
     """The poses that a snap starts from."""
 
-    count: int = 14_000
+    count: Count = 14_000
     """Drawn where the start may be far off."""
-    least_share: float = 0.25
+    least_share: NotNegative = 0.25
     """Share of them drawn where the caller says that it is close."""
-    gaussian_share: float = 0.1
+    gaussian_share: NotNegative = 0.1
     """Share drawn from the Gaussian about the start alone."""
-    ray_share: float = 0.1
+    ray_share: NotNegative = 0.1
     """Share then shifted along the viewing ray onto the observed surface; the rest is also turned onto it."""
-    scales: tuple[float, ...] = (0.3, 0.7, 1.0, 1.5)
+    scales: Items[NotNegative] = (0.3, 0.7, 1.0, 1.5)
     """Multiples of the spread that are cycled through."""
-    max_shift: float = 0.15
+    max_shift: Positive = 0.15
     """A point is put on observed depth only if it is no farther off, metres."""
-    max_turn: float = 2.0
+    max_turn: Positive = 2.0
     """A normal is turned onto the observed one only if the angle is smaller, radians."""
-    tries: int = 4
+    tries: Annotated[int, at_most(64)] = 4
     """Draws until a point falls on a measured pixel off the plane."""
 
 
@@ -73,19 +88,19 @@ class ProposalConfig:
 class AgreementConfig:
     """Weights of the sparse agreement (agreement.py)."""
 
-    free: float = 0.9
+    free: Number = 0.9
     """Of surface claimed where the sensor saw through."""
-    missing: float = 0.05
+    missing: Number = 0.05
     """Of surface claimed where there is no measurement."""
-    ring: float = 0.7
+    ring: Number = 0.7
     """Of observed surface that goes on beyond the silhouette."""
-    clear: float = 0.3
+    clear: Number = 0.3
     """Reward of a silhouette before a background that lies farther."""
-    area: float = 0.6
+    area: Number = 0.6
     """How much a view that shows more of the object counts more."""
-    prior: float = 0.03
+    prior: Number = 0.03
     """Of the heavy-tailed prior about the start."""
-    wide_softening: float = 1.0
+    wide_softening: Number = 1.0
     """Factor on `free` and `ring` in the first stage, where no hypothesis is exact yet."""
 
 
@@ -93,21 +108,21 @@ class AgreementConfig:
 class StageConfig:
     """One stage of the annealing: keep distinct modes, polish them, weigh them anew."""
 
-    modes: int
+    modes: Annotated[int, at_most(5_000)]
     """Distinct hypotheses that go on to this stage."""
-    niche_translation: float
+    niche_translation: Positive
     """Modes are distinct if they are farther apart than this, metres, ..."""
-    niche_rotation: float
+    niche_rotation: Positive
     """... or than this, radians."""
-    iterations: int
+    iterations: Annotated[int, at_most(10_000)]
     """Gauss-Newton steps."""
-    tukey_start: float
+    tukey_start: Positive
     """Width of the robust kernel in the first step, metres."""
-    tukey_end: float
+    tukey_end: Positive
     """Width of the robust kernel in the last step, metres."""
-    points: int
+    points: Count
     """Surface points in the polish and in the weight after it."""
-    epsilon: float
+    epsilon: Positive
     """Distance at which agreement ends, metres."""
 
 
@@ -115,24 +130,24 @@ class StageConfig:
 class SelectionConfig:
     """How the winner is chosen (selection.py): evidence in pixels over the mean silhouette area."""
 
-    prior: float = FITTED.prior
+    prior: Number = FITTED.prior
     """Weight of the heavy-tailed prior about the start."""
-    lead: float = 1.0
+    lead: Number = 1.0
     """The polished start replaces the start, and another mode replaces that, only if it scores better by this
     much, ..."""
-    lead_over_fit: float = 2.0
+    lead_over_fit: Number = 2.0
     """... or by this much where the start itself fits, ..."""
-    fit_match: float = 0.7
+    fit_match: Number = 0.7
     """... which it does where more of the claimed surface than this is matched, ..."""
-    aside_translation: float = 0.004
+    aside_translation: Number = 0.004
     """... and the pose is farther from it than this, metres, ..."""
-    aside_rotation: float = 0.07
+    aside_rotation: Number = 0.07
     """... or this, radians."""
-    min_match: float = 0.04
+    min_match: Number = 0.04
     """With less of the claimed surface matched than this, the start is kept."""
-    match_share: float = FITTED.match_share
+    match_share: Number = FITTED.match_share
     """Weight of the share of the claimed surface that was measured where it is claimed."""
-    classes: tuple[float, ...] = FITTED.classes
+    classes: Annotated[tuple[Number, ...], as_many_as(FITTED.classes)] = FITTED.classes
     """Weights of the classes of pixels, in the order of `evidence.class_names()`."""
 
 
@@ -140,11 +155,11 @@ class SelectionConfig:
 class ConfidenceConfig:
     """Calibration of the confidence (confidence.py)."""
 
-    temperature: float = FITTED.temperature
+    temperature: Positive = FITTED.temperature
     """Of the softmax that shares the belief among the modes."""
-    mode_radius: float = 0.07
+    mode_radius: Positive = 0.07
     """Hypotheses closer than this share of the diameter are one mode."""
-    weights: tuple[float, ...] = FITTED.confidence
+    weights: Annotated[tuple[Number, ...], as_many_as(FITTED.confidence)] = FITTED.confidence
     """Logistic weights of what speaks for the winner, in the order of `confidence.FEATURES`."""
 
 
@@ -152,19 +167,19 @@ class ConfidenceConfig:
 class ParticleFilterConfig:
     """The filter of the paper, which leaves the spread and the noise open."""
 
-    particles: int = 625
-    iterations: int = 640
-    epsilon: float = 0.01
+    particles: Count = 625
+    iterations: Annotated[int, at_most(10_000)] = 640
+    epsilon: Positive = 0.01
     """Eq. 3, metres."""
-    alpha: float = 0.5
+    alpha: NotNegative = 0.5
     """Eq. 5, weight of the share of observed points that are explained."""
-    beta: float = 0.5
+    beta: NotNegative = 0.5
     """Eq. 5, weight of the share of rendered points that agree."""
-    noise_translation: float = 0.002
+    noise_translation: NotNegative = 0.002
     """Standard deviation added to each axis after resampling, metres."""
-    noise_rotation: float = 0.02
+    noise_rotation: NotNegative = 0.02
     """The same for the rotation vector, radians."""
-    silhouette_pixels: int = 600
+    silhouette_pixels: Count = 600
     """Every k-th column and row is used, as long as the mean silhouette still covers this many pixels."""
 
 
@@ -179,11 +194,11 @@ ANYWHERE_STAGES = (
 class AnywhereConfig:
     """The search without a start (global_search.py)."""
 
-    count: int = 600_000
+    count: Count = 600_000
     """Proposals."""
-    kept: int = 30_000
+    kept: Count = 30_000
     """Proposals of which the distinct modes are taken."""
-    stages: tuple[StageConfig, ...] = ANYWHERE_STAGES
+    stages: Items[StageConfig] = ANYWHERE_STAGES
 
 
 DEFAULT_STAGES = (
@@ -197,11 +212,11 @@ DEFAULT_STAGES = (
 class RoundConfig:
     """One search for the object about the start."""
 
-    share: float
+    share: NotNegative
     """Of all proposals that are drawn, and of all modes that are kept."""
-    widening: float
+    widening: Positive
     """Proposals are drawn this many times wider than the search is said to go."""
-    doubt: float
+    doubt: NotNegative
     """The round is left out where the confidence so far is higher than this."""
 
 
@@ -221,20 +236,20 @@ DEFAULT_ROUNDS = tuple(
 class SnapConfig:
     """All constants of a snap that can be set; the defaults are the fast method."""
 
-    method: Literal["viewpoint", "particle_filter"] = "viewpoint"
+    method: Method = "viewpoint"
     """Sparse viewpoint model with polished modes, or the paper's particle filter on rendered depth."""
     observation: ObservationConfig = field(default_factory=ObservationConfig)
     spread: SpreadConfig = field(default_factory=SpreadConfig)
     proposals: ProposalConfig = field(default_factory=ProposalConfig)
-    wide_points: int = 40
+    wide_points: Count = 40
     """Surface points of a proposal that are looked up."""
-    wide_epsilon: float = 0.02
+    wide_epsilon: Positive = 0.02
     """Distance at which agreement of a proposal ends, metres."""
-    wide_kept: int = 5000
+    wide_kept: Count = 5000
     """Proposals of which the distinct modes are taken."""
     agreement: AgreementConfig = field(default_factory=AgreementConfig)
-    stages: tuple[StageConfig, ...] = DEFAULT_STAGES
-    rounds: tuple[RoundConfig, ...] = DEFAULT_ROUNDS
+    stages: Items[StageConfig] = DEFAULT_STAGES
+    rounds: Items[RoundConfig] = DEFAULT_ROUNDS
     """Searched one after the other, as far as the confidence asks for it."""
     anywhere: AnywhereConfig = field(default_factory=AnywhereConfig)
     selection: SelectionConfig = field(default_factory=SelectionConfig)
@@ -248,20 +263,26 @@ class SnapConfig:
 
     def to_dict(self) -> dict[str, Any]:
         """All fields as JSON values."""
-        return plain(self)
+        return msgspec.json.decode(msgspec.json.encode(self))
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> "SnapConfig":
         """The configuration whose fields are `values` over the defaults, or over `{"preset": "paper"}`.
 
         Raises:
-            ValueError: naming the field that is unknown or of the wrong type.
+            ValueError: naming the field that is unknown, of the wrong type or out of its bounds.
         """
         if not isinstance(values, dict):
             raise ValueError("config must be an object of named fields")
-        values = dict(values)
         presets = {"default": SnapConfig(), "paper": SnapConfig.paper()}
-        preset = values.pop("preset", "default")
-        if not isinstance(preset, str) or preset not in presets:
-            raise ValueError(f"config.preset must be one of {', '.join(presets)}; it is {preset!r}")
-        return merged(presets[preset], values, "config")
+        preset = values.get("preset", "default")
+        _check_choice(preset, tuple(presets), "config.preset")
+        fields = {key: value for key, value in values.items() if key != "preset"}
+        overlay = overlaid(presets[preset].to_dict(), fields, "config")
+        _check_choice(overlay["method"], get_args(Method), "config.method")
+        return converted(overlay, SnapConfig, "config")
+
+
+def _check_choice(value: Any, choices: tuple[str, ...], name: str) -> None:
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(choices)}; it is {reprlib.repr(value)}")
