@@ -10,7 +10,7 @@ from app.labeling.live.live_session import LiveSession
 from app.labeling.live.sessions import NotFoundError
 from app.labeling.moves.copying import Copy, copies_for
 from app.labeling.moves.history import PosedBy
-from app.labeling.permissions import require
+from app.labeling.moves.permissions import require
 from app.services import Services
 from app.storage.tables import Pose
 

@@ -8,7 +8,7 @@ from app.labeling.layers import Layers
 from app.labeling.live.live_session import LiveSession
 from app.labeling.moves.degrees_of_freedom import GizmoAxes
 from app.labeling.moves.history import PosedBy
-from app.labeling.permissions import Tool
+from app.labeling.moves.permissions import Tool
 from app.labeling.session_state import SessionState
 from app.labeling.snaps.snap_exchange import SnapStatus
 from app.storage.tables import FrameUse, Method, Pose

@@ -29,7 +29,7 @@ from app.api.registration_state import AssessmentOut, RegistrationOut, registrat
 from app.datasets.scene_data import camera_of
 from app.datasets.start_pose import start_pose
 from app.datasets.thumbnails import task_thumbnail
-from app.labeling.permissions import methods_of
+from app.labeling.moves.permissions import methods_of
 from app.services import Services
 from app.storage.roles import Role
 from app.storage.tables import (

@@ -16,8 +16,7 @@ from app.labeling.moves.camera_watch import Camera
 from app.labeling.moves.degrees_of_freedom import GizmoAxes
 from app.labeling.moves.history import History, Step
 from app.labeling.moves.operator_actions import OperatorActions
-from app.labeling.moves.pose_record import ActionError, PoseRecord, RecordEvent
-from app.labeling.permissions import (
+from app.labeling.moves.permissions import (
     TOOL_OF,
     Tool,
     Wanted,
@@ -28,6 +27,7 @@ from app.labeling.permissions import (
     require_method,
     tools_of,
 )
+from app.labeling.moves.pose_record import ActionError, PoseRecord, RecordEvent
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.session_lock import SessionLock
 from app.labeling.session_state import SessionState

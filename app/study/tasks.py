@@ -8,7 +8,7 @@ from sqlalchemy.orm import Session, selectinload
 
 from app.datasets.scene_data import SceneData, camera_of
 from app.datasets.start_pose import start_pose
-from app.labeling.permissions import methods_of
+from app.labeling.moves.permissions import methods_of
 from app.storage.database import Database
 from app.storage.tables import Object, Pose, Scene, Task
 from app.study.plan import Slot, StudyError, TaskRef

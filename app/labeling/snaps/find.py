@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from app import __version__
+from app.labeling.moves.permissions import Tool, require
 from app.labeling.moves.pose_record import PoseRecord
-from app.labeling.permissions import Tool, require
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.request import Request, Submit
 from app.labeling.snaps.snap_exchange import SnapStatus, stored_known

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 from app.labeling.moves.history import Step
+from app.labeling.moves.permissions import Tool, Wanted, require, require_frames, require_method
 from app.labeling.moves.pose_record import ActionError, Array, PoseRecord, said_of
-from app.labeling.permissions import Tool, Wanted, require, require_frames, require_method
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.live_snap import LiveSnap
 from app.labeling.snaps.request import Request, Submit

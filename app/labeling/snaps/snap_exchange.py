@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app import __version__
 from app.confidence.assessment import Assessment
-from app.labeling.permissions import Wanted
+from app.labeling.moves.permissions import Wanted
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.start_spread import StartSpread
 from app.storage.roles import Actor

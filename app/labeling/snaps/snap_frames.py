@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.datasets.scene_data import SceneData, camera_of
-from app.labeling.permissions import Wanted
+from app.labeling.moves.permissions import Wanted
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.snaps.snap_exchange import SnapFrames
 from app.storage.tables import Frame, Object

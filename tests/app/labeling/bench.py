@@ -7,7 +7,7 @@ import numpy as np
 
 from app.confidence.assessment import Assessed, Assessment
 from app.labeling.moves.history import replay
-from app.labeling.permissions import Wanted
+from app.labeling.moves.permissions import Wanted
 from app.labeling.scene.known_object import KnownObject
 from app.labeling.session import LabelingSession
 from app.labeling.session_state import SessionState

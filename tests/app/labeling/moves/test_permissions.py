@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from app.labeling.layers import Layers
+from app.labeling.moves.permissions import ALL, COMPARED, MACHINES, methods_of, require, tools_of
 from app.labeling.moves.pose_record import ActionError
-from app.labeling.permissions import ALL, COMPARED, MACHINES, methods_of, require, tools_of
 from app.storage.roles import Actor
 from app.storage.tables import Condition
 from tests.app.labeling.bench import START, Bench, result
