@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
+
 from app.access.auth import Auth
 from app.config import PROJECT, Settings
 from app.storage.database import Database
@@ -134,28 +136,16 @@ def serving(state_dir: Path, *arguments: str) -> Iterator[Server]:
 
 
 def descendants(pid: int) -> set[int]:
-    """Processes that a process started, and those started in turn."""
-    children: dict[int, list[int]] = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                stat = (entry / "stat").read_text()
-            except (FileNotFoundError, ProcessLookupError):
-                continue
-            parent = int(stat.rsplit(")", 1)[1].split()[1])
-            children.setdefault(parent, []).append(int(entry.name))
-    found: set[int] = set()
-    waiting = [pid]
-    while waiting:
-        for child in children.get(waiting.pop(), []):
-            found.add(child)
-            waiting.append(child)
-    return found
+    """Processes that a process started, and those started in turn; none where it is gone."""
+    try:
+        return {process.pid for process in psutil.Process(pid).children(recursive=True)}
+    except psutil.NoSuchProcess:
+        return set()
 
 
 def command_line(pid: int) -> Sequence[str]:
-    """What a process was started with; empty where it is gone."""
+    """What a process was started with; empty where it has ended, even if nobody has asked how."""
     try:
-        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
-    except (FileNotFoundError, ProcessLookupError):
+        return psutil.Process(pid).cmdline()
+    except psutil.NoSuchProcess:
         return []

@@ -1,15 +1,14 @@
 """Two people at once, and what listens on the network."""
 
-import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.labelling_page import LabellingPage
-from tests.processes import Server, descendants, serving
+from tests.processes import Server, serving
 
 pytestmark = pytest.mark.e2e
 
@@ -50,23 +49,10 @@ def test_only_the_public_port_listens_beyond_loopback(
 
 def listening(pid: int) -> set[tuple[str, int]]:
     """Addresses and ports that a process and its children listen on."""
-    sockets = set()
-    for process in {pid, *descendants(pid)}:
-        for link in Path(f"/proc/{process}/fd").iterdir():
-            try:
-                if match := re.fullmatch(r"socket:\[(\d+)\]", os.readlink(link)):
-                    sockets.add(match[1])
-            except FileNotFoundError:
-                continue
-    found = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
-            fields = line.split()
-            if fields[3] == "0A" and fields[9] in sockets:
-                address, port = fields[1].split(":")
-                dotted = ".".join(str(int(address[i : i + 2], 16)) for i in (6, 4, 2, 0))
-                found.add((dotted if table == "tcp" else address, int(port, 16)))
-    return found
+    server = psutil.Process(pid)
+    processes = (server, *server.children(recursive=True))
+    sockets = [socket for process in processes for socket in process.net_connections("tcp")]
+    return {(socket.laddr.ip, socket.laddr.port) for socket in sockets if socket.status == psutil.CONN_LISTEN}
 
 
 def test_a_foreign_page_cannot_act(server: Server, open_page: Callable[[str], Page]) -> None:

@@ -5,9 +5,9 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
-from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from distributed import Nanny, Scheduler, Worker
 
@@ -44,7 +44,7 @@ def snapper(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Snapper]:
     yield started
     workers = pids(started)
     started.close()
-    assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()]
+    assert not any(map(psutil.pid_exists, workers))
 
 
 @pytest.fixture(scope="module")
