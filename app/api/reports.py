@@ -74,6 +74,7 @@ class ReportOut(BaseModel):
     comparisons: list[ComparisonOut]
     truths: list[TruthOut]
     remarks: list[RemarkOut]
+    tables: list[str] = Field(description="each a file NAME.csv and a file NAME.parquet")
 
 
 def asked_config(
@@ -133,6 +134,8 @@ AskedDep = Annotated[Asked, Depends(asked_report)]
 @router.get("/{study_id}")
 def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
     """The curves of a study and all that is read off them, or of a part of it; of one error or of both."""
+    from app.analysis.report.tables.registry import tables
+
     report = asked.report
     collected = report.collected
     return ReportOut(
@@ -160,6 +163,7 @@ def get_report(asked: AskedDep, error: ErrorKind | None = None) -> ReportOut:
             for place in collected.truths
         ],
         remarks=remarks_out(report.remarks),
+        tables=list(tables()),
     )
 
 

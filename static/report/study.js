@@ -9,7 +9,6 @@ import { curvesSection, drawPanels, linesOf } from "./panels.js";
 import { remarksSection, section, tableOf, withCaution } from "./tables.js";
 
 const NAMES = { human: "human", default: "STG", paper: "STG, paper’s filter" };
-const TABLES = ["curves", "fitts", "hand_off", "gains", "comparisons", "trials", "samples", "truths", "remarks"];
 
 export async function showStudy(studyId, message) {
   const url = `/api/reports/${studyId}`;
@@ -65,7 +64,7 @@ function draw(report, url, asked, errors) {
     ...[rotation, handOffs, fitts, comparisons, truths].map((part) => part(report)).filter(Boolean),
     remarksSection(report.remarks),
     method(report),
-    downloads(url, asked),
+    downloads(report, url, asked),
     curvesSection(report.cells, NAMES, which),
   );
 }
@@ -162,13 +161,13 @@ function method({ config, algorithm, cells }) {
 }
 
 /** The figure is of the condition that is shown; the page and the tables are of all, which they compare. */
-function downloads(url, { condition, ...asked }) {
+function downloads({ tables }, url, { condition, ...asked }) {
   const link = (name, text, wanted = asked) => {
     const given = Object.entries(wanted).filter(([, value]) => value !== "");
     return element("a", { href: `${url}/files/${name}?${new URLSearchParams(given)}`, download: "" }, text);
   };
   const figure = { ...asked, condition };
-  const rows = TABLES.map((name) => [name.replace("_", "-"), link(`${name}.csv`, "CSV"), link(`${name}.parquet`, "Parquet")]);
+  const rows = tables.map((name) => [name.replace("_", "-"), link(`${name}.csv`, "CSV"), link(`${name}.parquet`, "Parquet")]);
   return section(
     "Download",
     element("p", { className: "row" }, link("figure.svg", "Figure (SVG)", figure), link("figure.pdf", "Figure (PDF)", figure), link("report.html", "Report (HTML)")),

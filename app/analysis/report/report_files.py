@@ -5,12 +5,13 @@ from pathlib import Path
 from app.analysis.report.figure import figure_bytes
 from app.analysis.report.page import page_of
 from app.analysis.report.report import Report
-from app.analysis.report.tables import SCHEMAS, csv_bytes, parquet_bytes, table_of
+from app.analysis.report.table_files import csv_bytes, filled, parquet_bytes
+from app.analysis.report.tables import registry
 
 
 def file_names() -> list[str]:
     """Figure, page, and each table as CSV and Parquet."""
-    tables = [f"{name}.{suffix}" for name in SCHEMAS for suffix in ("csv", "parquet")]
+    tables = [f"{name}.{suffix}" for name in registry.tables() for suffix in ("csv", "parquet")]
     return ["figure.svg", "figure.pdf", "report.html", *tables]
 
 
@@ -21,7 +22,7 @@ def file_of(report: Report, name: str) -> bytes:
         return page_of(report).encode()
     if suffix in ("svg", "pdf"):
         return figure_bytes(report, "svg" if suffix == "svg" else "pdf")
-    table = table_of(report, stem)
+    table = filled(registry.tables()[stem], report)
     return csv_bytes(table) if suffix == "csv" else parquet_bytes(table)
 
 

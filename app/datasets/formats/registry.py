@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from app.formats import formats_in
+from app.members import members_of
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class ImportFormat:
 @cache
 def formats() -> tuple[ImportFormat, ...]:
     """All formats; BOP is asked last, and takes whatever no other one recognises."""
-    found: list[ImportFormat] = formats_in(__package__)
+    found: list[ImportFormat] = members_of(__package__, "FORMAT")
     return tuple(sorted(found, key=lambda one: (one.name == "bop", one.name)))
 
 

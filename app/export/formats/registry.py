@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
-from app.formats import formats_in
+from app.members import members_of
 
 
 @dataclass(frozen=True)
@@ -24,5 +24,5 @@ class ExportFormat:
 @cache
 def formats() -> Mapping[str, ExportFormat]:
     """All formats by name; the whole dataset comes first."""
-    found: list[ExportFormat] = formats_in(__package__)
+    found: list[ExportFormat] = members_of(__package__, "FORMAT")
     return MappingProxyType({one.name: one for one in found})
