@@ -25,7 +25,11 @@ export function svg(tag, attributes, ...children) {
 
 /** A decorative icon of `icons.svg`. */
 export function icon(name) {
-  return svg("svg", { class: "icon", "aria-hidden": true }, svg("use", { href: `/static/icons.svg#${name}` }));
+  return svg(
+    "svg",
+    { class: "icon", "aria-hidden": true },
+    svg("use", { href: `/static/icons.svg#${name}` }),
+  );
 }
 
 /** A picture that leaves a cube in its place while it loads and when there is none. */
@@ -48,5 +52,8 @@ export function setText(node, text) {
 
 /** A colour of the style sheet as [red, green, blue] from 0 to 1. */
 export function rgb(color) {
-  return color.match(/[\d.]+/g).slice(0, 3).map((value) => value / 255);
+  return color
+    .match(/[\d.]+/g)
+    .slice(0, 3)
+    .map((value) => value / 255);
 }

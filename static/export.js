@@ -56,7 +56,8 @@ function showContents() {
   const { id, scenes, objects, tasks, tasks_submitted: submitted, suggestions_open: open } = chosen();
   const figures = { "poses submitted": submitted, "tasks still open": tasks - submitted, scenes, objects };
   byId("undecided").hidden = !open;
-  for (const link of document.querySelectorAll("#objects, #undecided a")) link.href = `/objects?dataset_id=${id}`;
+  for (const link of document.querySelectorAll("#objects, #undecided a"))
+    link.href = `/objects?dataset_id=${id}`;
   setText(byId("undecided-count"), count(open, "object"));
   byId("contents").replaceChildren(
     ...Object.entries(figures).map(([name, number]) =>

@@ -26,7 +26,8 @@ export function fileSize(bytes) {
 export function framesText(frames) {
   if (!frames) return "";
   const { used, agreeing, asked } = frames;
-  const others = asked === 0 ? "" : `${agreeing} of ${asked} ${asked === 1 ? "other agrees" : "others agree"}`;
+  const others =
+    asked === 0 ? "" : `${agreeing} of ${asked} ${asked === 1 ? "other agrees" : "others agree"}`;
   if (used === 1 && !others) return "";
   return [`${used} ${used === 1 ? "frame" : "frames"}`, others].filter(Boolean).join(", ");
 }

@@ -30,7 +30,12 @@ export async function openPage(message, show) {
 
 function showHeader({ name, role }) {
   byId("pages").replaceChildren(...PAGES.filter(({ roles }) => roles.includes(role)).map(pageLink));
-  const who = element("span", { className: "who", title: name }, element("span", { className: "visually-hidden" }, "Signed in as "), name);
+  const who = element(
+    "span",
+    { className: "who", title: name },
+    element("span", { className: "visually-hidden" }, "Signed in as "),
+    name,
+  );
   const out = element("button", { type: "button", className: "button quiet", onclick: signOut }, "Sign out");
   byId("account").replaceChildren(who, element("span", { className: "role" }, role), out);
 }

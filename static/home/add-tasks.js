@@ -14,7 +14,9 @@ export function setUpAddTasks(onAdded) {
   const message = messageArea(byId("add-message"));
   let objects = [];
 
-  byId("add-method").append(...Object.entries(METHODS).map(([method, { choice }]) => new Option(choice, method)));
+  byId("add-method").append(
+    ...Object.entries(METHODS).map(([method, { choice }]) => new Option(choice, method)),
+  );
   datasetSelect.addEventListener("change", () => guarded(() => showDataset()));
   sceneSelect.addEventListener("change", () => guarded(showScene));
   list.addEventListener("change", showChoice);

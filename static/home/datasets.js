@@ -18,7 +18,8 @@ export async function showDatasets({ selected, choose, openImport, openRisk, ope
   const buttons = datasets.map((dataset) => datasetButton(dataset));
 
   const press = (id) => {
-    for (const button of buttons) button.setAttribute("aria-pressed", button.dataset.datasetId === String(id));
+    for (const button of buttons)
+      button.setAttribute("aria-pressed", button.dataset.datasetId === String(id));
   };
   for (const button of buttons) {
     button.addEventListener("click", () => {
@@ -46,10 +47,14 @@ function followPreparation(datasets) {
     if (note) setText(note, preparationText(dataset));
   }
   if (!datasets.some(isPreparing)) return;
-  timer = setTimeout(async () => followPreparation(await getAll("/api/datasets").catch(() => datasets)), ASK_AGAIN_MS);
+  timer = setTimeout(
+    async () => followPreparation(await getAll("/api/datasets").catch(() => datasets)),
+    ASK_AGAIN_MS,
+  );
 }
 
-const isPreparing = ({ objects, objects_prepared: prepared, problems }) => prepared + problems.length < objects;
+const isPreparing = ({ objects, objects_prepared: prepared, problems }) =>
+  prepared + problems.length < objects;
 
 function preparationText(dataset) {
   const { objects, objects_prepared: prepared, problems } = dataset;

@@ -45,7 +45,8 @@ async function showHome(me) {
   byId("open-add-tasks").addEventListener("click", openAddTasks);
 
   async function showAll(datasetId) {
-    const chooseDataset = (id) => Promise.all([showNextTask(datasets, id), tasks.chooseDataset(id)]).catch(message.problem);
+    const chooseDataset = (id) =>
+      Promise.all([showNextTask(datasets, id), tasks.chooseDataset(id)]).catch(message.problem);
     const openImport = isAdmin ? importDialog.open : null;
     const openRisk = me.role === "operator" ? null : riskDialog.open;
     const openWarnings = me.role === "operator" ? null : warningsDialog.open;

@@ -17,7 +17,11 @@ export async function showNextTask(datasets, datasetId) {
 
 function describeTask(task, filter) {
   const verb = task.mine === null ? "Start" : "Continue";
-  const start = element("a", { id: "next-task", className: "button human big", href: addressWith(`/label/${task.id}`, filter) });
+  const start = element("a", {
+    id: "next-task",
+    className: "button human big",
+    href: addressWith(`/label/${task.id}`, filter),
+  });
   start.append(`${verb} labelling`, icon("next"));
   return [
     picture(task.thumbnail_url, "next-picture"),
@@ -34,7 +38,12 @@ function describeTask(task, filter) {
 
 function describeDone(dataset) {
   return [
-    element("p", { className: "next-name" }, icon("check"), dataset ? ` All of ${dataset.name} done` : " All done"),
+    element(
+      "p",
+      { className: "next-name" },
+      icon("check"),
+      dataset ? ` All of ${dataset.name} done` : " All done",
+    ),
     element("p", { className: "muted" }, "No task is waiting for you here. You can look at any in the list."),
   ];
 }

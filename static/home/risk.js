@@ -30,8 +30,13 @@ export function setUpRisk(onSet) {
     dataset = of;
     const { name, risk, risk_is_set: isSet, risk_of_settings: ofSettings } = dataset;
     const present = !isSet ? "" : CHOICES.includes(risk) ? String(risk) : OTHER;
-    const words = [["", `as the settings say (${percent(ofSettings)})`], ...CHOICES.map((one) => [String(one), percent(one)])];
-    const choices = [...words, [OTHER, "other"]].map(([value, text]) => choice(value, text, value === present));
+    const words = [
+      ["", `as the settings say (${percent(ofSettings)})`],
+      ...CHOICES.map((one) => [String(one), percent(one)]),
+    ];
+    const choices = [...words, [OTHER, "other"]].map(([value, text]) =>
+      choice(value, text, value === present),
+    );
     setText(byId("risk-title"), `Risk of ${name}`);
     byId("risk-choices").replaceChildren(...choices);
     byId("risk-other").hidden = present !== OTHER;
@@ -86,18 +91,30 @@ function draw({ risk, threshold, is_own: isOwn, rests_on: restsOn, needs }, { na
   const allowed = percent(risk);
   const isKnown = threshold !== null;
   byId("risk-meaning").hidden = byId("risk-found").hidden = false;
-  setText(byId("risk-meaning"), `The machine takes over only where at most ${allowed} of such poses are wrong.`);
+  setText(
+    byId("risk-meaning"),
+    `The machine takes over only where at most ${allowed} of such poses are wrong.`,
+  );
   byId("risk-threshold").dataset.assessed = isKnown ? "accept" : "doubt";
   byId("risk-threshold").replaceChildren(
     icon(isKnown ? "check" : "alert"),
-    element("span", {}, isKnown ? askedFor(threshold) : `No confidence is known to bear ${allowed} out: the machine never takes over.`),
+    element(
+      "span",
+      {},
+      isKnown
+        ? askedFor(threshold)
+        : `No confidence is known to bear ${allowed} out: the machine never takes over.`,
+    ),
   );
   const source = isOwn
     ? `So say ${count(restsOn, "registration")} of this dataset, which calibrate it.`
     : `So says the calibration that comes with Snap6D, made of ${count(restsOn, "estimate")}.`;
   setText(byId("risk-source"), [source, ...calibrationNotes(calibration, isOwn, allowed, needs)].join(" "));
   byId("risk-command").hidden = isOwn && isKnown;
-  byId("risk-command").replaceChildren(whatToDo(isKnown, isOwn, needs), element("code", {}, `snap6d calibrate ${name}`));
+  byId("risk-command").replaceChildren(
+    whatToDo(isKnown, isOwn, needs),
+    element("code", {}, `snap6d calibrate ${name}`),
+  );
 }
 
 /** Ends before the command. */

@@ -23,7 +23,8 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   byId("scene-filter").addEventListener("change", (event) => change("scene_id", event.target.value));
   byId("state-filter").addEventListener("change", (event) => change("state", event.target.value));
-  for (const kind of KINDS) byId(`${kind}-filter`).addEventListener("change", (event) => change(kind, event.target.value));
+  for (const kind of KINDS)
+    byId(`${kind}-filter`).addEventListener("change", (event) => change(kind, event.target.value));
   byId("more").addEventListener("click", () => showMore().catch(onProblem));
   for (const radio of document.querySelectorAll("#state-filter input")) {
     radio.checked = radio.value === (filter.state ?? "");
@@ -60,7 +61,9 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   function append({ items, next: cursor }) {
     next = cursor ?? null;
-    byId("tasks").append(...items.map((task) => element("li", {}, taskCard(task, me, filter), cardLinks(task, me))));
+    byId("tasks").append(
+      ...items.map((task) => element("li", {}, taskCard(task, me, filter), cardLinks(task, me))),
+    );
     for (const kind of KINDS) {
       const nodes = [...document.querySelectorAll(`#tasks [data-kind="${kind}"]`)];
       const isSame = new Set(nodes.map((node) => node.textContent)).size < 2;
@@ -83,12 +86,17 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
 
   /** A choice of modes or conditions is there where there are several. */
   function showKinds() {
-    const chosen = datasets.filter(({ id }) => filter.dataset_id === null || String(id) === String(filter.dataset_id));
+    const chosen = datasets.filter(
+      ({ id }) => filter.dataset_id === null || String(id) === String(filter.dataset_id),
+    );
     for (const kind of KINDS) {
       const select = byId(`${kind}-filter`);
       const there = new Set(chosen.flatMap((dataset) => dataset[`${kind}s`]));
       if (filter[kind]) there.add(filter[kind]);
-      select.replaceChildren(new Option(`All ${kind}s`, ""), ...[...there].sort().map((name) => new Option(name, name)));
+      select.replaceChildren(
+        new Option(`All ${kind}s`, ""),
+        ...[...there].sort().map((name) => new Option(name, name)),
+      );
       select.value = filter[kind] ?? "";
       select.parentElement.hidden = there.size < 2 && !filter[kind];
     }
@@ -142,7 +150,11 @@ function taskCard(task, me, filter) {
       { className: "card-text" },
       element("span", { className: "card-name" }, task.name),
       element("span", { className: "card-scene" }, sceneText(task)),
-      element("span", { className: "card-kinds" }, ...KINDS.map((kind) => element("span", { "data-kind": kind }, task[kind]))),
+      element(
+        "span",
+        { className: "card-kinds" },
+        ...KINDS.map((kind) => element("span", { "data-kind": kind }, task[kind])),
+      ),
       element("span", { className: "card-state" }, icon(task.state), stateSentence(task, me)),
     ),
   );
@@ -159,7 +171,11 @@ function sceneText({ scene, method }) {
  * reviewer, who also sees what is to be thought of the machine's last estimate.
  */
 function cardLinks({ operators, object }, me) {
-  const page = element("a", { href: `/objects/${object.id}`, "aria-label": `Object ${object.name}` }, "Object");
+  const page = element(
+    "a",
+    { href: `/objects/${object.id}`, "aria-label": `Object ${object.name}` },
+    "Object",
+  );
   const links = operators
     .filter(({ name, state }) => state === "submitted" && (name === me.name || me.role !== "operator"))
     .flatMap(({ name, registration_id: id, assessment }) => {

@@ -14,7 +14,11 @@ export function candidateCard(candidate, index, frame, { choose, take }) {
   if (frame.color_url) image.src = frame.color_url;
   const button = element(
     "button",
-    { type: "button", "aria-pressed": "false", "aria-label": [`Candidate ${index + 1}`, chance].filter(Boolean).join(", ") },
+    {
+      type: "button",
+      "aria-pressed": "false",
+      "aria-label": [`Candidate ${index + 1}`, chance].filter(Boolean).join(", "),
+    },
     element("span", { className: "crop" }, image, canvas),
     element("span", { className: "caption" }, element("strong", {}, index + 1), element("span", {}, chance)),
   );

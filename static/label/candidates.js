@@ -44,7 +44,10 @@ export function candidatesPart(page) {
     if (wanted !== source || isOutdated(wanted, answer)) return;
     const { frame_id: frameId, poses } = posesOf(wanted, answer);
     const frame = frames.find(({ id }) => id === frameId);
-    const withWorld = poses.map((one) => ({ ...one, T_world_object: product(frame.T_world_camera, one.T_camera_object) }));
+    const withWorld = poses.map((one) => ({
+      ...one,
+      T_world_object: product(frame.T_world_camera, one.T_camera_object),
+    }));
     show(withWorld.map((one, index) => candidateCard(one, index, frame, { choose, take })));
     setText(byId("candidates-title"), titleOf(wanted, poses.length));
     byId("candidates").hidden = wanted.kind === "mode" && poses.length < 2;
@@ -58,14 +61,15 @@ export function candidatesPart(page) {
     cards = newCards;
     byId("candidates").hidden = true;
     byId("candidate-list").replaceChildren(...cards.map(({ item }) => item));
-    for (const id of ["candidate-previous", "candidate-next", "candidate-take"]) byId(id).hidden = cards.length === 0;
+    for (const id of ["candidate-previous", "candidate-next", "candidate-take"])
+      byId(id).hidden = cards.length === 0;
     mark(-1);
   }
 
   function mark(index) {
     chosen = index;
     byId("candidate-take").disabled = chosen < 0;
-    cards.forEach(({ button }, i) => button.setAttribute("aria-pressed", i === chosen));
+    for (const [i, { button }] of cards.entries()) button.setAttribute("aria-pressed", i === chosen);
   }
 
   /** Looks at a candidate; -1 at none. The newest choice wins, and answers never overtake each other. */
@@ -90,7 +94,7 @@ export function candidatesPart(page) {
   function step(by) {
     if (cards.length < 2 || !page.canMove()) return;
     byId("candidates").hidden = false;
-    const from = chosen < 0 ? 0 : chosen; // of modes the first is where the object is
+    const from = Math.max(chosen, 0); // of modes the first is where the object is
     choose((from + by + cards.length) % cards.length);
   }
 
@@ -102,7 +106,11 @@ export function candidatesPart(page) {
       if (page.registration().offer) page.act("offer-accept");
       return;
     }
-    const body = { T_world_object: cards[index].T_world_object, technique: source.kind, stems_from: source.id };
+    const body = {
+      T_world_object: cards[index].T_world_object,
+      technique: source.kind,
+      stems_from: source.id,
+    };
     page.message.clear();
     await page.put("pose", body).catch(page.message.problem);
   }
@@ -124,8 +132,20 @@ export function candidatesPart(page) {
   }
 
   const bindings = [
-    { keys: ["["], does: "Look at the candidate before; Y takes it", run: () => step(-1), repeats: true, tool: "snap" },
-    { keys: ["]"], does: "Look at the next candidate; Y takes it", run: () => step(+1), repeats: true, tool: "snap" },
+    {
+      keys: ["["],
+      does: "Look at the candidate before; Y takes it",
+      run: () => step(-1),
+      repeats: true,
+      tool: "snap",
+    },
+    {
+      keys: ["]"],
+      does: "Look at the next candidate; Y takes it",
+      run: () => step(+1),
+      repeats: true,
+      tool: "snap",
+    },
   ];
   return { title: "The machine", bindings, open, draw, accept, leave };
 }

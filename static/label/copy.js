@@ -37,7 +37,12 @@ export function copyPart(page) {
   }
 
   function row(item) {
-    const text = element("span", { className: "copy-text" }, element("strong", {}, nameOf(item)), infoOf(item));
+    const text = element(
+      "span",
+      { className: "copy-text" },
+      element("strong", {}, nameOf(item)),
+      infoOf(item),
+    );
     const choice = element("button", { type: "button" }, picture(item.thumbnail_url, "copy-picture"), text);
     choice.addEventListener("click", () => copy(item));
     return element("li", {}, choice);
@@ -52,7 +57,9 @@ export function copyPart(page) {
     button.disabled = !page.canMove();
   }
 
-  const bindings = [{ keys: ["C"], does: "Copy the pose from another frame or operator", run: show, tool: "copy" }];
+  const bindings = [
+    { keys: ["C"], does: "Copy the pose from another frame or operator", run: show, tool: "copy" },
+  ];
   return { title: "The object", bindings, draw };
 }
 
@@ -60,7 +67,14 @@ function nameOf({ is_neighbour: isNeighbour, scene, name, operator }) {
   return isNeighbour ? `${scene}, ${name}` : operator;
 }
 
-function infoOf({ is_neighbour: isNeighbour, is_mine: isMine, operator, state, confidence, posed_by: poser }) {
+function infoOf({
+  is_neighbour: isNeighbour,
+  is_mine: isMine,
+  operator,
+  state,
+  confidence,
+  posed_by: poser,
+}) {
   const whose = isMine ? "mine" : isNeighbour ? `by ${operator}` : "this task";
   const how = confidence === null ? POSED_BY[poser] : `confidence ${confidence.toFixed(2)}`;
   return [whose, state === "submitted" ? "submitted" : "not submitted yet", how].join(" · ");

@@ -15,9 +15,17 @@ export function depthOf(frame) {
   return loaded.get(frame);
 }
 
-async function load({ raw_depth_url: url, width, height, depth_scale: scale, depth_tolerance: tolerance, intrinsics }) {
+async function load({
+  raw_depth_url: url,
+  width,
+  height,
+  depth_scale: scale,
+  depth_tolerance: tolerance,
+  intrinsics,
+}) {
   const answer = await fetch(url);
-  if (!answer.ok) throw new Error("The depth image could not be loaded; switch the agreement off and on to try again.");
+  if (!answer.ok)
+    throw new Error("The depth image could not be loaded; switch the agreement off and on to try again.");
   const { fx, fy, cx, cy } = intrinsics;
   return {
     raw: new Uint16Array(await answer.arrayBuffer()),

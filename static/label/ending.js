@@ -41,6 +41,8 @@ export function endingPart(page) {
     showNext(task).catch(page.message.problem);
   }
 
-  const bindings = [{ keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask, tool: "ending" }];
+  const bindings = [
+    { keys: ["Shift+Enter"], does: "Skip the task, with a reason (1 to 4)", run: ask, tool: "ending" },
+  ];
   return { title: "The task", bindings, open: (opened) => (task = opened), draw };
 }

@@ -2,8 +2,8 @@
 
 import { byId, element, picture, setText } from "../dom.js";
 import { shownCamera } from "./outline.js";
-import { resize } from "./webgl.js";
 import { relativeTo } from "./pose.js";
+import { resize } from "./webgl.js";
 
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image
 const DRAG_PAUSE = 200; // ms between thumbnails while all the time belongs to the large image
@@ -83,7 +83,11 @@ function thumbnail(frame, choose) {
   image.style.aspectRatio = `${frame.width} / ${frame.height}`;
   image.append(canvas);
   const name = `Frame ${frame.image_id}`;
-  const button = element("button", { type: "button", title: name, "aria-label": `Show frame ${frame.image_id}` }, image);
+  const button = element(
+    "button",
+    { type: "button", title: name, "aria-label": `Show frame ${frame.image_id}` },
+    image,
+  );
   button.addEventListener("click", () => choose(frame));
   return { frame, canvas, button, item: element("li", {}, button) };
 }

@@ -29,7 +29,10 @@ const STEPS = [
     isDone: (now, before) => now.snap?.state === "done" && before.snap?.state !== "done",
     tool: "snap",
   },
-  { name: "image", text: "Press `Z`: the image comes closer. Where the pose is right, the outline follows the edge." },
+  {
+    name: "image",
+    text: "Press `Z`: the image comes closer. Where the pose is right, the outline follows the edge.",
+  },
   {
     name: "undo",
     text: `Press \`${MOD} Z\`: whatever was done, by you or the machine, can be undone.`,

@@ -26,7 +26,7 @@ export function imagePart(page) {
   let drawOn = null; // the thumbnails
   let depth = null; // where its agreement is to be seen
   let registration = null;
-  let waiting = 0;
+  let isWaiting = false; // for the next picture of the screen
   const boxSize = { width: 0, height: 0 };
   const colors = {};
 
@@ -101,11 +101,12 @@ export function imagePart(page) {
 
   /** Draws at the next picture of the screen, however much changes until then. */
   function drawSoon() {
-    waiting ||= requestAnimationFrame(drawOutline);
+    if (!isWaiting) requestAnimationFrame(drawOutline);
+    isWaiting = true;
   }
 
   function drawOutline() {
-    waiting = 0;
+    isWaiting = false;
     if (!drawMesh || !registration || canvas.hidden) return;
     const { T_camera_object: T } = registration;
     const unit = Math.min(devicePixelRatio, 2);
@@ -129,7 +130,8 @@ export function imagePart(page) {
   /** Whose pose it is; asked of the style sheet once, since asking computes the styles of the page. */
   function colorNow() {
     const { source } = canvas.dataset;
-    return (colors[source] ??= rgb(getComputedStyle(canvas).color));
+    colors[source] ??= rgb(getComputedStyle(canvas).color);
+    return colors[source];
   }
 
   function fitOrWhole() {

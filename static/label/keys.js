@@ -15,7 +15,8 @@ export function keyBindings(bindings, isHere = () => true) {
   function onKeyDown(event) {
     const pressed = chord(event);
     const binding = byChord.get(pressed);
-    if (!binding || !isHere(binding) || belongsToControl(event) || document.querySelector("dialog[open]")) return;
+    if (!binding || !isHere(binding) || belongsToControl(event) || document.querySelector("dialog[open]"))
+      return;
     event.preventDefault();
     event.stopPropagation();
     if (!event.repeat || binding.repeats) binding.run(pressed, event.repeat);

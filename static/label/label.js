@@ -33,9 +33,9 @@ import { signInAgainHere } from "./sign-in-again.js";
 import { snapFramesPart } from "./snap-frames.js";
 import { followRegistration } from "./stream.js";
 import { submissionPart } from "./submission.js";
+import { swapPart } from "./swap.js";
 import { thingsPart } from "./things.js";
 import { threePointsPart } from "./three-points.js";
-import { swapPart } from "./swap.js";
 import { showTools } from "./tools.js";
 import { trialPart } from "./trial.js";
 import { uncertaintyPart } from "./uncertainty.js";
@@ -116,9 +116,18 @@ const grouped = (group, bindings) => bindings.map((binding) => ({ group, ...bind
 const BINDINGS = [
   ...grouped("The task", [
     { keys: ["Mod+Z"], does: "Undo", run: (_key, isHeld) => step("undo", isHeld), repeats: true },
-    { keys: ["Mod+Shift+Z", "Mod+Y"], does: "Redo", run: (_key, isHeld) => step("redo", isHeld), repeats: true },
+    {
+      keys: ["Mod+Shift+Z", "Mod+Y"],
+      does: "Redo",
+      run: (_key, isHeld) => step("redo", isHeld),
+      repeats: true,
+    },
     { keys: ["Shift+R"], does: "Back to the start pose", run: () => act("reset") },
-    { keys: ["Escape"], does: "Leave a mode, or cancel the snap; or back to the 3-D view", run: leaveOrCancel },
+    {
+      keys: ["Escape"],
+      does: "Leave a mode, or cancel the snap; or back to the 3-D view",
+      run: leaveOrCancel,
+    },
     { keys: ["Enter"], does: "Submit; once more: go to the next task", run: submitOrGoOn },
     { keys: ["?"], does: "Show these keys", run: () => openHelp() },
   ]),
@@ -214,7 +223,8 @@ function show(received) {
     message.show("The object's symmetries were changed: the next snap goes by the new ones.");
   }
   if (problem && problem !== before?.message) message.show(problem, "problem");
-  if (before && registration.state !== before.state && !page.isTrial()) showDatasetProgress().catch(message.problem);
+  if (before && registration.state !== before.state && !page.isTrial())
+    showDatasetProgress().catch(message.problem);
 }
 
 function reportSnap(before, snap) {
@@ -255,7 +265,10 @@ async function requestSnap() {
   const before = registration.snap;
   snapRequest = post(path("snaps"), {});
   const { method } = registration;
-  show({ ...registration, snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method, frames: null } });
+  show({
+    ...registration,
+    snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method, frames: null },
+  });
   try {
     await snapRequest;
   } catch (error) {

@@ -43,7 +43,12 @@ export function machinePart(page) {
   }
 
   const bindings = [
-    { keys: ["V"], does: "Live on or off: a ghost shows where a snap would land", run: toggle, tool: "live snap" },
+    {
+      keys: ["V"],
+      does: "Live on or off: a ghost shows where a snap would land",
+      run: toggle,
+      tool: "live snap",
+    },
   ];
   return { title: "The machine", bindings, draw };
 }
@@ -52,7 +57,8 @@ export function machinePart(page) {
 function noteFor({ state, offer, live, snap, confidence, assessment, dragging }) {
   if (state !== "open") return null;
   if (live) return { kind: "live", text: "A snap would land at the ghost", ...live };
-  if (offer) return offer.quiet ? { kind: "suggested", text: "The machine suggests the ghost", ...offer } : null;
+  if (offer)
+    return offer.quiet ? { kind: "suggested", text: "The machine suggests the ghost", ...offer } : null;
   const tookOver = snap?.state === "done" && snap.asked_by === "machine";
   if (!tookOver || confidence === null || dragging) return null;
   return { kind: "taken", text: "The machine took over", confidence, assessment };

@@ -19,7 +19,8 @@ export function methodPart(page) {
   }
 
   function draw({ method, methods, state }) {
-    if (choice.childElementCount === 0) choice.append(...methods.map((name) => new Option(METHODS[name].choice, name)));
+    if (choice.childElementCount === 0)
+      choice.append(...methods.map((name) => new Option(METHODS[name].choice, name)));
     choice.value = method;
     choice.disabled = !page.isConnected();
     byId("method-choice").hidden = methods.length < 2 || state !== "open";

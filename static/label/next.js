@@ -27,6 +27,8 @@ async function show(dataset) {
   const link = byId("next-task");
   link.href = addressWith(task ? `/label/${task.id}` : "/", filter);
   link.replaceChildren(task ? "Next task " : "Back to the tasks ", element("kbd", {}, "Enter"), icon("next"));
-  const sentence = task ? `Next: ${task.name}, ${task.scene.label}.` : `That was the last one of ${isNarrow(filter) ? "those you chose" : dataset.name}.`;
+  const sentence = task
+    ? `Next: ${task.name}, ${task.scene.label}.`
+    : `That was the last one of ${isNarrow(filter) ? "those you chose" : dataset.name}.`;
   setText(byId("next-name"), sentence);
 }

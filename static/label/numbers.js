@@ -39,7 +39,10 @@ export function numbersPart(page) {
     if (!isNew || !page.canMove()) return;
     const { frame_id: frameId, T_camera_object: T } = page.registration();
     const { T_world_camera } = frames.find((frame) => frame.id === frameId);
-    const body = { T_world_object: product(T_world_camera, withNumber(T, name, value)), technique: "numbers" };
+    const body = {
+      T_world_object: product(T_world_camera, withNumber(T, name, value)),
+      technique: "numbers",
+    };
     page.message.clear();
     await page.put("pose", body).catch(page.message.problem);
   }

@@ -97,7 +97,12 @@ export function objectView(canvas, { mesh, drawOn, drawUnder }, { onPoint, onTur
   function cameraFor(unit) {
     const focal = (zoom * FILLED * canvas.clientHeight * Math.sqrt(DISTANCE ** 2 - 1)) / 2;
     const centre = (size) => (unit * size) / 2 - 0.5;
-    return { fx: unit * focal, fy: unit * focal, cx: centre(canvas.clientWidth), cy: centre(canvas.clientHeight) };
+    return {
+      fx: unit * focal,
+      fy: unit * focal,
+      cx: centre(canvas.clientWidth),
+      cy: centre(canvas.clientHeight),
+    };
   }
 
   function poseInView() {
@@ -116,7 +121,8 @@ export function objectView(canvas, { mesh, drawOn, drawUnder }, { onPoint, onTur
 
   /** A ray of the view's axes in the object's frame. */
   function rayFrom(direction) {
-    const inObject = (vector) => [0, 1, 2].map((k) => vector.reduce((sum, value, i) => sum + rotation[i][k] * value, 0));
+    const inObject = (vector) =>
+      [0, 1, 2].map((k) => vector.reduce((sum, value, i) => sum + rotation[i][k] * value, 0));
     const toEye = inObject([0, 0, -DISTANCE * radius]);
     return { origin: middle.map((value, k) => value + toEye[k]), towards: inObject(direction) };
   }
@@ -137,7 +143,9 @@ export function objectView(canvas, { mesh, drawOn, drawUnder }, { onPoint, onTur
   }
 
   function inView(point) {
-    return poseInView().slice(0, 3).map((row) => dot(row, point) + row[3]);
+    return poseInView()
+      .slice(0, 3)
+      .map((row) => dot(row, point) + row[3]);
   }
 
   return { look, turn, move, resting, placeOf, projected, middle, radius };

@@ -6,7 +6,10 @@ import { byId, setText } from "../dom.js";
 export function othersPart() {
   function draw({ others }) {
     const [first, ...rest] = others;
-    const who = rest.length === 0 ? `${first} is` : `${first} and ${rest.length === 1 ? rest[0] : `${rest.length} others`} are`;
+    const who =
+      rest.length === 0
+        ? `${first} is`
+        : `${first} and ${rest.length === 1 ? rest[0] : `${rest.length} others`} are`;
     setText(byId("others"), first ? `${who} working on this task, too` : "");
     byId("others").title = others.join(", ");
   }

@@ -11,13 +11,15 @@ let shared = null;
 
 /** The page's object, {mesh, drawOn}: its mesh, and what `meshCopying` makes of it; one for all who show it. */
 export function sharedDrawing(url) {
-  return (shared ??= loadMesh(url).then((mesh) => ({ mesh, drawOn: meshCopying(mesh) })));
+  shared ??= loadMesh(url).then((mesh) => ({ mesh, drawOn: meshCopying(mesh) }));
+  return shared;
 }
 
 /** The mesh {vertices, faces} behind the `outline_mesh_url` of an object. */
 async function loadMesh(url) {
   const answer = await fetch(url);
-  if (!answer.ok) throw new Error("The object's mesh could not be loaded; load the page again to see its outline.");
+  if (!answer.ok)
+    throw new Error("The object's mesh could not be loaded; load the page again to see its outline.");
   const content = await answer.arrayBuffer();
   const [vertexCount, faceCount] = new Uint32Array(content, 0, 2);
   const vertices = new Float32Array(content, 8, 3 * vertexCount);
@@ -36,7 +38,8 @@ export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
   const box = { left: Infinity, top: Infinity, right: -Infinity, bottom: -Infinity };
   for (let i = 0; i < vertices.length; i += 3) {
     const [x, y, z] = [0, 1, 2].map(
-      (row) => T[row][0] * vertices[i] + T[row][1] * vertices[i + 1] + T[row][2] * vertices[i + 2] + T[row][3],
+      (row) =>
+        T[row][0] * vertices[i] + T[row][1] * vertices[i + 1] + T[row][2] * vertices[i + 2] + T[row][3],
     );
     if (z < NEAR) continue;
     const [u, v] = [(fx * x) / z + cx + 0.5, (fy * y) / z + cy + 0.5];
@@ -80,7 +83,10 @@ export function meshDrawing(canvas, { vertices, faces }) {
 
   function drawShape({ camera, T, depth, width, height }) {
     const { shape } = programs;
-    if (depth && depth !== depthThere) fillDepth(gl, (depthThere = depth));
+    if (depth && depth !== depthThere) {
+      fillDepth(gl, depth);
+      depthThere = depth;
+    }
     gl.bindFramebuffer(gl.FRAMEBUFFER, buffers.sampled);
     gl.viewport(0, 0, width, height);
     gl.clearColor(0, 0, 0, 0);

@@ -81,7 +81,8 @@ function drawSnap(registration) {
 
 function snapStatus({ state, snap, offer, confidence, method, methods }) {
   if (state !== "open") return "";
-  const isChosen = method === "paper" && methods.length > 1 && (!snap || (snap.state === "done" && snap.method !== method));
+  const isChosen =
+    method === "paper" && methods.length > 1 && (!snap || (snap.state === "done" && snap.method !== method));
   if (isChosen && !offer) return "Snap is by the paper’s filter now: 5 to 10 s.";
   if (!snap) return "";
   if (snap.state !== "done") {

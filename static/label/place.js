@@ -44,6 +44,13 @@ export function placePart(page) {
     if (!page.canMove()) leave();
   }
 
-  const bindings = [{ keys: ["P"], does: "Place the object by a click; Esc leaves this", run: () => use(!on), tool: "click-to-place" }];
+  const bindings = [
+    {
+      keys: ["P"],
+      does: "Place the object by a click; Esc leaves this",
+      run: () => use(!on),
+      tool: "click-to-place",
+    },
+  ];
   return { title: "The object", bindings, attach: pointing.attach, leave, draw };
 }

@@ -45,7 +45,11 @@ export function scenePointing(page, onPoint, onDouble = () => {}) {
     view.document.head.append(style);
     roots.add(view.document.documentElement);
     const options = { capture: true };
-    view.addEventListener("pointerdown", (event) => on && event.button === 0 && event.stopPropagation(), options);
+    view.addEventListener(
+      "pointerdown",
+      (event) => on && event.button === 0 && event.stopPropagation(),
+      options,
+    );
     view.addEventListener(
       "click",
       (event) => {
@@ -90,5 +94,9 @@ function shownAt(image) {
   const box = image.getBoundingClientRect();
   const { naturalWidth: width, naturalHeight: height } = image;
   const scale = Math.min(box.width / width, box.height / height);
-  return { scale, left: box.left + (box.width - width * scale) / 2, top: box.top + (box.height - height * scale) / 2 };
+  return {
+    scale,
+    left: box.left + (box.width - width * scale) / 2,
+    top: box.top + (box.height - height * scale) / 2,
+  };
 }

@@ -21,7 +21,9 @@ export function rotationVector(T) {
 /** The pose in a frame of axes, from both in the world: inverse(T_world_frame) @ T_world_object. */
 export function relativeTo(T_world_frame, T_world_object) {
   const [a, b] = [T_world_frame, T_world_object];
-  const from = [0, 1, 2].map((row) => b[row].map((value, column) => (column === 3 ? value - a[row][3] : value)));
+  const from = [0, 1, 2].map((row) =>
+    b[row].map((value, column) => (column === 3 ? value - a[row][3] : value)),
+  );
   const turned = (row, column) => [0, 1, 2].reduce((sum, k) => sum + a[k][row] * from[k][column], 0);
   return [...[0, 1, 2].map((row) => [0, 1, 2, 3].map((column) => turned(row, column))), [0, 0, 0, 1]];
 }
@@ -34,7 +36,7 @@ function quaternion([[a, b, c], [d, e, f], [g, h, i]]) {
     [c - g, b + d, 1 - a + e - i, f + h],
     [d - b, c + g, f + h, 1 - a - e + i],
   ];
-  const best = candidates.reduce((one, other) => (Math.hypot(...other) > Math.hypot(...one) ? other : one));
+  const [best] = candidates.toSorted((one, other) => Math.hypot(...other) - Math.hypot(...one));
   const scale = (best[0] < 0 ? -1 : 1) / Math.hypot(...best);
   return best.map((component) => component * scale);
 }

@@ -25,7 +25,12 @@ export function precisionPart(page) {
   const buttons = (name) => [...document.querySelectorAll(`[data-${name}]`)];
   const waiting = [];
   let sending = false;
-  let { step, axes, open } = { step: 1, axes: "view", open: false, ...JSON.parse(localStorage[STORED] ?? "{}") };
+  let { step, axes, open } = {
+    step: 1,
+    axes: "view",
+    open: false,
+    ...JSON.parse(localStorage[STORED] ?? "{}"),
+  };
 
   section.open = open;
   section.addEventListener("toggle", () => {
@@ -34,7 +39,8 @@ export function precisionPart(page) {
   });
   for (const button of buttons("step")) button.addEventListener("click", () => useStep(+button.dataset.step));
   for (const button of buttons("axes")) button.addEventListener("click", () => useAxes(button.dataset.axes));
-  for (const button of buttons("gizmo")) button.addEventListener("click", () => useGizmo(button.dataset.gizmo));
+  for (const button of buttons("gizmo"))
+    button.addEventListener("click", () => useGizmo(button.dataset.gizmo));
   for (const button of buttons("turn")) {
     const { turn, about } = button.dataset;
     button.addEventListener("click", () => rotate(ALONG[about], +turn));
@@ -66,7 +72,8 @@ export function precisionPart(page) {
 
   function draw({ gizmo_axes: gizmo }) {
     press(buttons("gizmo"), (button) => button.dataset.gizmo === gizmo);
-    for (const button of [...buttons("gizmo"), ...buttons("turn"), byId("rest")]) button.disabled = !page.canMove();
+    for (const button of [...buttons("gizmo"), ...buttons("turn"), byId("rest")])
+      button.disabled = !page.canMove();
   }
 
   function move(letter) {
@@ -116,7 +123,13 @@ export function precisionPart(page) {
   const letterOf = (chord) => chord.at(-1);
 
   const bindings = [
-    { keys: LETTERS, does: "Move the object a step", run: (key) => move(letterOf(key)), repeats: true, tool: "precision" },
+    {
+      keys: LETTERS,
+      does: "Move the object a step",
+      run: (key) => move(letterOf(key)),
+      repeats: true,
+      tool: "precision",
+    },
     {
       keys: lettersWith("Shift+"),
       caps: ["Shift", ...LETTERS],
@@ -139,8 +152,18 @@ export function precisionPart(page) {
       run: (key) => turn(letterOf(key), 180, "flip"),
       tool: "precision",
     },
-    { keys: ["1", "2", "3"], does: "Steps: 0.5, 2, 10 mm and degrees", run: (key) => useStep(key - 1), tool: "precision" },
-    { keys: ["X"], does: "Step along the view, the object, the world", run: () => useAxes(nextAxes()), tool: "precision" },
+    {
+      keys: ["1", "2", "3"],
+      does: "Steps: 0.5, 2, 10 mm and degrees",
+      run: (key) => useStep(key - 1),
+      tool: "precision",
+    },
+    {
+      keys: ["X"],
+      does: "Step along the view, the object, the world",
+      run: () => useAxes(nextAxes()),
+      tool: "precision",
+    },
     { keys: ["G"], does: "Gizmo along the object, the world", run: () => useGizmo(otherGizmo()) },
     { keys: ["Shift+P"], does: "Put the object down on the surface", run: rest, tool: "precision" },
   ];

@@ -1,7 +1,7 @@
 /** Seeing whether the pose is right: how depth agrees with it, and what the 3-D view shows or puts away. */
 
 import { byId, setText } from "../dom.js";
-import { drawsFinely, rememberLayers, rememberedLayers } from "./fineness.js";
+import { drawsFinely, rememberedLayers, rememberLayers } from "./fineness.js";
 
 const AT_FIRST = { cloud: true, mesh: true, texture: true, fine: true, agreement: false };
 
@@ -51,9 +51,18 @@ export function seeingPart(page) {
   }
 
   const bindings = [
-    { keys: ["R"], does: "Colour the object by how depth agrees, or not", run: () => toggle("agreement"), tool: "agreement" },
+    {
+      keys: ["R"],
+      does: "Colour the object by how depth agrees, or not",
+      run: () => toggle("agreement"),
+      tool: "agreement",
+    },
     { keys: ["B"], does: "Hide the cloud, and show it again", run: () => toggle("cloud") },
-    { keys: ["Shift+F"], does: "All measured points, or few, which are drawn sooner", run: () => toggle("fine") },
+    {
+      keys: ["Shift+F"],
+      does: "All measured points, or few, which are drawn sooner",
+      run: () => toggle("fine"),
+    },
     { keys: ["M"], does: "Hide the mesh, and show it again", run: () => toggle("mesh") },
     { keys: ["Shift+M"], does: "The mesh in its own colours, or in orange", run: () => toggle("texture") },
   ];

@@ -35,7 +35,12 @@ export function snapFramesPart(page) {
   }
 
   const bindings = [
-    { keys: ["Shift+T"], does: "Snap with this frame only, or with all that see the object", run: toggle, tool: "snap" },
+    {
+      keys: ["Shift+T"],
+      does: "Snap with this frame only, or with all that see the object",
+      run: toggle,
+      tool: "snap",
+    },
   ];
   return { title: "The machine", bindings, draw };
 }

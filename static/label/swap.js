@@ -13,6 +13,8 @@ export function swapPart() {
     setText(byId("swap-text"), isLarge ? "Reduce" : "Enlarge");
   }
 
-  const bindings = [{ keys: ["Shift+Z"], does: "Enlarge the image in place of the 3-D view, and back", run: swap }];
+  const bindings = [
+    { keys: ["Shift+Z"], does: "Enlarge the image in place of the 3-D view, and back", run: swap },
+  ];
   return { title: "Image and frames", bindings };
 }

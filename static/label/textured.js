@@ -19,7 +19,8 @@ export async function objectDrawing({ outline_mesh_url: outline, textured_mesh_u
 /** The mesh behind a `textured_mesh_url`: {vertices, faces}, and `colors` or {places, picture}. */
 async function load(url) {
   const answer = await fetch(url);
-  if (!answer.ok) throw new Error("The object's colours could not be loaded; load the page again to see them.");
+  if (!answer.ok)
+    throw new Error("The object's colours could not be loaded; load the page again to see them.");
   const content = await answer.arrayBuffer();
   const [vertexCount, faceCount, pictureSize] = new Uint32Array(content, 0, 3);
   let from = 12;

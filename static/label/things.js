@@ -54,7 +54,9 @@ export function thingsPart(page) {
     box.classList.toggle("hiding", isHidden());
   }
 
-  const bindings = [{ keys: ["Shift+B"], does: "Hide or show what is done in this scene", run: toggle, tool: "neighbours" }];
+  const bindings = [
+    { keys: ["Shift+B"], does: "Hide or show what is done in this scene", run: toggle, tool: "neighbours" },
+  ];
   return { title: "The view", bindings, draw };
 }
 
@@ -67,5 +69,9 @@ function item({ task_id: id, name, is_current: current, state, skip_reason: reas
   const word = current ? "this one" : WORDS[state];
   const words = element("span", { className: "thing-state", title: reason ?? "" }, word);
   const props = current ? { "aria-current": "page" } : { href: `/label/${id}${location.search}` };
-  return element("li", {}, element("a", props, swatch, element("span", { className: "thing-name" }, name), words));
+  return element(
+    "li",
+    {},
+    element("a", props, swatch, element("span", { className: "thing-name" }, name), words),
+  );
 }

@@ -50,7 +50,8 @@ export function threePointsPart(page) {
   async function showObject() {
     const drawing = await objectDrawing(object); // who opens it twice meanwhile gets one view all the same
     view ??= objectView(byId("pairs-object"), drawing, { onPoint: pickOnObject, onTurn: markObject });
-    if (view === null) throw new Error("Without WebGL 2 the object cannot be shown: no points can be clicked on it.");
+    if (view === null)
+      throw new Error("Without WebGL 2 the object cannot be shown: no points can be clicked on it.");
     if (!on) return;
     byId("pairs").hidden = false;
     view.look(page.registration().T_camera_object);
@@ -141,7 +142,8 @@ export function threePointsPart(page) {
 
   /** One at a time, like fits: marks that were taken back must not come last. */
   async function markScene() {
-    if (page.isConnected()) await put(page.path("marks"), { points_world: picked.scene }).catch(page.message.problem);
+    if (page.isConnected())
+      await put(page.path("marks"), { points_world: picked.scene }).catch(page.message.problem);
   }
 
   function drawPairs() {
@@ -159,7 +161,11 @@ export function threePointsPart(page) {
     out.title = out.getAttribute("aria-label");
     out.addEventListener("click", () => takeOut(index));
     const number = element("span", { className: "pair-number" }, `${index + 1}`);
-    const off = element("span", {}, residual === undefined ? "both sides clicked" : `${millimetres(residual)} off`);
+    const off = element(
+      "span",
+      {},
+      residual === undefined ? "both sides clicked" : `${millimetres(residual)} off`,
+    );
     return element("li", {}, number, off, out);
   }
 
@@ -201,8 +207,18 @@ export function threePointsPart(page) {
   }
 
   const bindings = [
-    { keys: ["T"], does: "Place the object by three points; Esc leaves this", run: () => use(!on), tool: "three points" },
-    { keys: ["Backspace"], does: "Three points: take the last click back", run: takeBack, tool: "three points" },
+    {
+      keys: ["T"],
+      does: "Place the object by three points; Esc leaves this",
+      run: () => use(!on),
+      tool: "three points",
+    },
+    {
+      keys: ["Backspace"],
+      does: "Three points: take the last click back",
+      run: takeBack,
+      tool: "three points",
+    },
   ];
   return { title: "The object", bindings, open, attach: pointing.attach, leave, draw };
 }

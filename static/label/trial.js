@@ -26,7 +26,10 @@ export function trialPart(page) {
 
   async function showPlace() {
     const { done, total, task: next } = await get("/api/participation");
-    setText(byId("trial-place"), next?.is_practice ? "Practice" : `Task ${Math.min(done + 1, total)} of ${total}`);
+    setText(
+      byId("trial-place"),
+      next?.is_practice ? "Practice" : `Task ${Math.min(done + 1, total)} of ${total}`,
+    );
   }
 
   /** Counts from when the scene is there; who comes back later goes on with what they had used. */

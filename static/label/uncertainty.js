@@ -53,7 +53,12 @@ export function uncertaintyPart(page) {
   }
 
   const bindings = [
-    { keys: ["Shift+V"], does: "Hide what the machine is unsure of, and show it again", run: toggle, tool: "uncertainty" },
+    {
+      keys: ["Shift+V"],
+      does: "Hide what the machine is unsure of, and show it again",
+      run: toggle,
+      tool: "uncertainty",
+    },
   ];
   return { title: "The machine", bindings, attach, draw };
 }

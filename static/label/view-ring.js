@@ -14,7 +14,12 @@ export function viewRingPart() {
   function follow(target) {
     const capture = { capture: true };
     target.addEventListener("keydown", () => (byKey = true), capture);
-    target.addEventListener("pointerdown", () => ((byKey = false), show()), capture);
+    target.addEventListener("pointerdown", showForPointer, capture);
+  }
+
+  function showForPointer() {
+    byKey = false;
+    show();
   }
 
   function show() {

@@ -75,7 +75,14 @@ export function zoomable(box, onChange) {
   panByPointer(box, pan);
   new ResizeObserver(() => show(times, middle.x, middle.y)).observe(box);
 
-  return { fit, whole, setSize, zoomIn: () => by(STEP), zoomOut: () => by(1 / STEP), isWhole: () => times === 1 };
+  return {
+    fit,
+    whole,
+    setSize,
+    zoomIn: () => by(STEP),
+    zoomOut: () => by(1 / STEP),
+    isWhole: () => times === 1,
+  };
 }
 
 const limited = (times) => Math.min(Math.max(times, 1), MOST);

@@ -17,7 +17,10 @@ export async function residualOf({ id }, { axis, point, fold }) {
  */
 export function axisEditor({ item, save, onChange, play, onProblem }) {
   const form = byId("editor");
-  const fields = { axis: ["x", "y", "z"].map((k) => byId(`axis-${k}`)), point: ["x", "y", "z"].map((k) => byId(`point-${k}`)) };
+  const fields = {
+    axis: ["x", "y", "z"].map((k) => byId(`axis-${k}`)),
+    point: ["x", "y", "z"].map((k) => byId(`point-${k}`)),
+  };
   let changed = null; // the place of the axis that is changed; null: one is added
   let points = null; // picked so far; null: none are asked for
 
@@ -53,8 +56,10 @@ export function axisEditor({ item, save, onChange, play, onProblem }) {
   }
 
   function fill({ axis, point, fold }) {
-    axis.forEach((value, k) => (fields.axis[k].value = rounded(value)));
-    point.forEach((value, k) => (fields.point[k].value = rounded(1000 * value)));
+    for (const k of [0, 1, 2]) {
+      fields.axis[k].value = rounded(axis[k]);
+      fields.point[k].value = rounded(1000 * point[k]);
+    }
     byId("fold").value = fold ?? "";
   }
 
@@ -82,7 +87,10 @@ export function axisEditor({ item, save, onChange, play, onProblem }) {
   }
 
   function tellNext() {
-    const next = points === null ? "" : `Click the ${points.length ? "second" : "first"} point of the axis on the object.`;
+    const next =
+      points === null
+        ? ""
+        : `Click the ${points.length ? "second" : "first"} point of the axis on the object.`;
     setText(byId("pick-next"), next);
   }
 
@@ -121,7 +129,8 @@ export function axisEditor({ item, save, onChange, play, onProblem }) {
     const axis = required();
     if (!axis) return;
     const { axes } = item();
-    const all = changed === null ? [...axes, axis] : axes.map((one, index) => (index === changed ? axis : one));
+    const all =
+      changed === null ? [...axes, axis] : axes.map((one, index) => (index === changed ? axis : one));
     if (await save(all)) close();
   }
 

@@ -33,7 +33,9 @@ await openPage(message, async ({ role }) => {
 
 /** `/objects?dataset_id=` leads to the first object that waits for a decision, or else the first. */
 async function goToOne() {
-  const objects = await getAll("/api/objects", { dataset_id: new URLSearchParams(location.search).get("dataset_id") });
+  const objects = await getAll("/api/objects", {
+    dataset_id: new URLSearchParams(location.search).get("dataset_id"),
+  });
   const first = objects.find(({ suggestions_open: open }) => open) ?? objects[0];
   if (first) location.replace(`/objects/${first.id}`);
   else message.show("There are no objects yet. An administrator has to import a dataset first.");
@@ -48,10 +50,21 @@ async function showPage() {
   ]);
   showNames(dataset);
   const places = { canvas: byId("mesh"), rest: byId("rest"), axes: byId("axes") };
-  const told = { onPoint: (point) => editor?.onPoint(point), onTurned: showTurned, onGrasp: () => spin(false) };
+  const told = {
+    onPoint: (point) => editor?.onPoint(point),
+    onTurned: showTurned,
+    onGrasp: () => spin(false),
+  };
   stage = stageOf(places, drawing, item, told);
-  if (stage === null) message.show("Without WebGL 2 the object cannot be shown here; its numbers hold all the same.");
-  editor = axisEditor({ item: () => item, save: decide, onChange: drawStage, play, onProblem: message.problem });
+  if (stage === null)
+    message.show("Without WebGL 2 the object cannot be shown here; its numbers hold all the same.");
+  editor = axisEditor({
+    item: () => item,
+    save: decide,
+    onChange: drawStage,
+    play,
+    onProblem: message.problem,
+  });
   for (const node of document.querySelectorAll(".lead-only")) node.hidden = !isLead;
   byId("asks-lead").hidden = isLead;
   draw();
@@ -71,7 +84,9 @@ function showNames({ id, name }) {
     "BOP id": `${item.obj_id}`,
   };
   byId("facts").replaceChildren(
-    ...Object.entries(facts).map(([what, value]) => element("div", {}, element("dt", {}, what), element("dd", {}, value))),
+    ...Object.entries(facts).map(([what, value]) =>
+      element("div", {}, element("dt", {}, what), element("dd", {}, value)),
+    ),
   );
 }
 
@@ -113,7 +128,11 @@ function drawSuggestions() {
         number: `${index + 1}`,
         axis,
         note: residualText(axis.residual, diameter),
-        actions: isThere ? [element("span", { className: "accepted" }, icon("check"), "accepted")] : isLead ? [accept] : [],
+        actions: isThere
+          ? [element("span", { className: "accepted" }, icon("check"), "accepted")]
+          : isLead
+            ? [accept]
+            : [],
       });
     }),
   );
@@ -131,7 +150,12 @@ function suggestedText() {
 function drawPresent() {
   const { axes, symmetries, symmetries_version: version, suggestions } = item;
   setText(byId("version"), `version ${version}`);
-  setText(byId("present-text"), axes.length ? `What snaps, errors and exports go by: ${groupText(symmetries)}.` : nothingText(suggestions));
+  setText(
+    byId("present-text"),
+    axes.length
+      ? `What snaps, errors and exports go by: ${groupText(symmetries)}.`
+      : nothingText(suggestions),
+  );
   byId("present").replaceChildren(...axes.map(presentRow));
   byId("undo").disabled = item.undo_version === null;
   byId("none").disabled = !axes.length && !item.suggestions_open;
@@ -140,7 +164,8 @@ function drawPresent() {
 function nothingText(suggestions) {
   if (item.suggestions_open) return "None, until somebody decides.";
   if (item.symmetries_version > 1) return "None, as was decided.";
-  if (suggestions === null) return "None so far. The server looks into the mesh in the background: come back in a moment.";
+  if (suggestions === null)
+    return "None so far. The server looks into the mesh in the background: come back in a moment.";
   return "None, and none were found on the mesh.";
 }
 
@@ -151,7 +176,11 @@ function presentRow(axis, index) {
   if (known) tell(known.residual);
   else residualOf(item, axis).then(tell, () => setText(note, ""));
   const edit = element("button", { type: "button", className: "button quiet" }, "Change");
-  const remove = element("button", { type: "button", className: "button quiet square", title: "Remove" }, icon("close"));
+  const remove = element(
+    "button",
+    { type: "button", className: "button quiet square", title: "Remove" },
+    icon("close"),
+  );
   edit.setAttribute("aria-label", `Change axis ${letter(index)}`);
   remove.setAttribute("aria-label", `Remove axis ${letter(index)}`);
   edit.addEventListener("click", () => editor.open(index));
@@ -160,11 +189,20 @@ function presentRow(axis, index) {
 }
 
 function axisRow({ number, axis, note, actions }) {
-  const start = element("button", { type: "button", className: "button square", title: "Play its turns" }, icon("play"));
+  const start = element(
+    "button",
+    { type: "button", className: "button square", title: "Play its turns" },
+    icon("play"),
+  );
   start.setAttribute("aria-label", `Play the turns of axis ${number}`);
   start.setAttribute("aria-pressed", "false");
   start.addEventListener("click", () => play(start === played ? null : start, axis));
-  const text = element("span", { className: "axis-text" }, axisText(axis), typeof note === "string" ? element("small", {}, note) : note);
+  const text = element(
+    "span",
+    { className: "axis-text" },
+    axisText(axis),
+    typeof note === "string" ? element("small", {}, note) : note,
+  );
   return element("li", {}, element("span", { className: "number" }, number), start, text, ...actions);
 }
 
@@ -186,7 +224,10 @@ async function change(decision) {
   deciding = true;
   message.clear();
   try {
-    item = await put(`/api/objects/${objectId}/symmetries`, { ...decision, version: item.symmetries_version });
+    item = await put(`/api/objects/${objectId}/symmetries`, {
+      ...decision,
+      version: item.symmetries_version,
+    });
     play(null, null);
     draw();
     await showList();

@@ -18,7 +18,10 @@ const DEGREES = 180 / Math.PI;
  * degrees while a turn is played, null when it ends. Null where the browser has no WebGL 2.
  */
 export function stageOf({ canvas, rest, axes }, drawing, { size, centre }, { onPoint, onTurned, onGrasp }) {
-  const view = objectView(canvas, drawing, { onPoint: (point) => playing || onPoint(point), onTurn: drawAround });
+  const view = objectView(canvas, drawing, {
+    onPoint: (point) => playing || onPoint(point),
+    onTurn: drawAround,
+  });
   if (view === null) return null;
   let shown = []; // axes of symmetry: {axis, point, label, kind}
   let points = [];
@@ -112,7 +115,11 @@ export function stageOf({ canvas, rest, axes }, drawing, { size, centre }, { onP
     const [{ x, y }, middle] = [view.projected(at), view.projected(centre)];
     const anchor = Math.abs(x - middle.x) < 12 ? "middle" : x < middle.x ? "end" : "start";
     const beside = anchor === "middle" ? 0 : anchor === "end" ? -6 : 6;
-    return svg("text", { x: x + beside, y: y + (y < middle.y ? -5 : 12), "text-anchor": anchor, class: kind }, content);
+    return svg(
+      "text",
+      { x: x + beside, y: y + (y < middle.y ? -5 : 12), "text-anchor": anchor, class: kind },
+      content,
+    );
   }
 
   view.look(seenFrom(FIRST_EYE));

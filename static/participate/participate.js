@@ -8,18 +8,22 @@ const MODES = { accurate: "As accurately as you can", quick: "As quickly as you 
 const TOOLS = {
   manual: "The handles of the object alone; there is no machine that helps.",
   snap: "The handles, and Snap (Space): roughly in place, the machine fits the object to its points.",
-  "paper snap": "The handles, and Snap (Space): roughly in place, the machine fits the object to its points in some seconds.",
+  "paper snap":
+    "The handles, and Snap (Space): roughly in place, the machine fits the object to its points in some seconds.",
   auto:
     "The handles, and Snap (Space). After each move the machine looks by itself, too, and takes over where it is " +
     "confident; you may take that back.",
   "three points":
     "The handles, Snap (Space), and Three points (T): click points on the object and the same ones in the scene.",
-  "click-to-place": "The handles, Snap (Space), and Place (P, or a double click): the object goes where you click.",
+  "click-to-place":
+    "The handles, Snap (Space), and Place (P, or a double click): the object goes where you click.",
   "live snap": "The handles, Snap (Space), and Live (V): a ghost shows where a snap would land; Y takes it.",
-  "find it": "The handles, Snap (Space), and Find (F): the machine shows where the object may be; Y takes one.",
+  "find it":
+    "The handles, Snap (Space), and Find (F): the machine shows where the object may be; Y takes one.",
 };
 const CLOCK = { quick: "A clock runs while the task is open.", accurate: "No clock is shown." };
-const LINK_NEEDED = "Please open the link that was given to you: it leads to your study, as often as you like.";
+const LINK_NEEDED =
+  "Please open the link that was given to you: it leads to your study, as often as you like.";
 
 /** What goes into a screen before it is shown. */
 const FILL = {
@@ -45,7 +49,9 @@ byId("withdraw-dialog").addEventListener("close", () => {
 });
 window.addEventListener("pageshow", ({ persisted }) => persisted && location.reload()); // "back" from a task
 
-window.addEventListener("hashchange", () => signInByLink().then((signedIn) => signedIn && location.reload(), refuse));
+window.addEventListener("hashchange", () =>
+  signInByLink().then((signedIn) => signedIn && location.reload(), refuse),
+);
 
 try {
   await signInByLink();
@@ -134,7 +140,9 @@ function taskUrl() {
 }
 
 function whatComes() {
-  return place.task.is_practice ? "Practice, which does not count" : `Task ${place.done + 1} of ${place.total}`;
+  return place.task.is_practice
+    ? "Practice, which does not count"
+    : `Task ${place.done + 1} of ${place.total}`;
 }
 
 function questionField({ text, choices, optional }) {

@@ -23,7 +23,10 @@ const bothInPeople = ({ translation, rotation }) => [
   rotation.map((radians) => radians * DEGREES),
 ];
 
-const most = (curve) => bothInPeople(curve).flat().reduce((one, other) => Math.max(one, other), 2 * LEAST);
+const most = (curve) =>
+  bothInPeople(curve)
+    .flat()
+    .reduce((one, other) => Math.max(one, other), 2 * LEAST);
 
 function scale(curve, height) {
   const decades = Math.log(most(curve) / LEAST);

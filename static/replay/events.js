@@ -59,7 +59,13 @@ export function eventList(trace, choose) {
 function row(event, choose) {
   const actor = event.actor === "machine" ? "machine" : "human";
   const time = element("span", { className: "event-time" }, clockText(event.end));
-  const button = element("button", { type: "button" }, time, icon(actor), element("span", {}, sentence(event)));
+  const button = element(
+    "button",
+    { type: "button" },
+    time,
+    icon(actor),
+    element("span", {}, sentence(event)),
+  );
   button.dataset.actor = actor;
   button.addEventListener("click", () => choose(event.end));
   return element("li", {}, button);

@@ -48,12 +48,20 @@ try {
 async function open() {
   const [trace, { view_url: viewUrl }] = await Promise.all([get(`${url}/trace`), post(`${url}/replay`)]);
   const task = await get(`/api/tasks/${trace.task_id}`);
-  const [scene, object] = await Promise.all([get(`/api/scenes/${task.scene.id}`), get(`/api/objects/${task.object.id}`)]);
+  const [scene, object] = await Promise.all([
+    get(`/api/scenes/${task.scene.id}`),
+    get(`/api/objects/${task.object.id}`),
+  ]);
   showNames(task, trace);
   image.open(task, scene, object);
   const events = eventList(trace, (seconds) => clock.put(seconds));
   const place = drawTimeLine(trace, (seconds) => clock.put(seconds));
-  clock = playbackClock({ duration: trace.seconds, idle: trace.idle, onPlaying: showPlaying, onTime: showTime });
+  clock = playbackClock({
+    duration: trace.seconds,
+    idle: trace.idle,
+    onPlaying: showPlaying,
+    onTime: showTime,
+  });
   setUpControls(trace, events, viewUrl);
   clock.put(trace.first_sight);
 
@@ -68,7 +76,10 @@ async function open() {
   }
 }
 
-function showNames({ dataset, scene, name }, { operator, condition, state, is_simulated: simulated, seconds }) {
+function showNames(
+  { dataset, scene, name },
+  { operator, condition, state, is_simulated: simulated, seconds },
+) {
   document.title = `Replay of ${name} · Snap6D`;
   setText(byId("crumb-dataset"), dataset.name);
   setText(byId("crumb-scene"), scene.label);
@@ -131,11 +142,17 @@ function drawMoment(moment) {
   const { ghost, confidence, assessment, posed_by: poser, to_last: toLast } = moment;
   byId("ghost").hidden = ghost === null;
   if (ghost) {
-    setText(byId("ghost-text"), `${ghost.on_offer ? "Offered by the machine" : "Put here by the machine"}, confidence `);
+    setText(
+      byId("ghost-text"),
+      `${ghost.on_offer ? "Offered by the machine" : "Put here by the machine"}, confidence `,
+    );
     setText(byId("ghost-confidence"), ghost.confidence.toFixed(2));
     drawAssessment(byId("ghost-assessment"), ghost.assessment);
   }
-  const numbers = [`${(1000 * toLast.translation).toFixed(1)} mm`, `${(DEGREES * toLast.rotation).toFixed(1)}°`];
+  const numbers = [
+    `${(1000 * toLast.translation).toFixed(1)} mm`,
+    `${(DEGREES * toLast.rotation).toFixed(1)}°`,
+  ];
   setText(byId("distance"), `${numbers.join(" · ")} to the end`);
   const thought = assessment ? `, ${assessment.verdict}` : "";
   drawPoser(byId("source"), poser, confidence === null ? "" : `, ${confidence.toFixed(2)}${thought}`);

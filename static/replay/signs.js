@@ -26,7 +26,13 @@ export const SIGNS = [
   { name: "submit", kinds: ["submit"], lane: "human", path: flag, look: "plain" },
   { name: "snap applied", kinds: ["snap_applied"], lane: "machine", path: bars, look: "full" },
   { name: "snap offered", kinds: ["snap_offered"], lane: "machine", path: bars, look: "hollow" },
-  { name: "snap failed or cancelled", kinds: ["snap_failed", "snap_cancelled"], lane: "machine", path: cross, look: "line" },
+  {
+    name: "snap failed or cancelled",
+    kinds: ["snap_failed", "snap_cancelled"],
+    lane: "machine",
+    path: cross,
+    look: "line",
+  },
   { name: "accept", kinds: ["accept"], lane: "machine", path: diamond, look: "full" },
   { name: "view moved", kinds: ["view"], lane: "view", path: bar(4), look: "full" },
 ];

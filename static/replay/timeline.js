@@ -26,13 +26,16 @@ export function drawTimeLine(trace, onTime) {
         svg("path", { class: "grid", d: `M0 ${y}H${width}` }),
         svg("text", { class: "tick", x: 2, y: y - 2 }, value),
       ]),
-      ...curvePaths(trace.curve, at, CURVE_HEIGHT).map((d, i) => svg("path", { class: ["curve", "curve dashed"][i], d })),
+      ...curvePaths(trace.curve, at, CURVE_HEIGHT).map((d, i) =>
+        svg("path", { class: ["curve", "curve dashed"][i], d }),
+      ),
       ...present.map((sign) => signPath(sign, trace.events, at)),
     );
   }
 
   let held = false;
-  const timeAt = ({ clientX }) => ((clientX - plot.getBoundingClientRect().left) / plot.clientWidth) * trace.seconds;
+  const timeAt = ({ clientX }) =>
+    ((clientX - plot.getBoundingClientRect().left) / plot.clientWidth) * trace.seconds;
   plot.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
     held = true;
@@ -58,7 +61,19 @@ function idleStretch(from, to, { start, end }) {
   const box = svg("rect", { class: "idle", x: from, y: 0, width: to - from, height: HEIGHT });
   if (to - from < LEAST_LABELLED) return [box];
   const name = `idle ${Math.round(end - start)} s`;
-  return [box, svg("text", { class: "idle-name", x: (from + to) / 2, y: CURVE_HEIGHT + laneTop("machine") + 14, "text-anchor": "middle" }, name)];
+  return [
+    box,
+    svg(
+      "text",
+      {
+        class: "idle-name",
+        x: (from + to) / 2,
+        y: CURVE_HEIGHT + laneTop("machine") + 14,
+        "text-anchor": "middle",
+      },
+      name,
+    ),
+  ];
 }
 
 function legendEntry({ name, lane, path, look }) {

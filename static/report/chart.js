@@ -21,15 +21,24 @@ export function chart(title, error, series, compared) {
   mark.style.display = "none";
   const picture = svg(
     "svg",
-    { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, tabindex: 0, role: "application", "aria-roledescription": "chart", "aria-label": title },
+    {
+      viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+      tabindex: 0,
+      role: "application",
+      "aria-roledescription": "chart",
+      "aria-label": title,
+    },
     ...axes(scales, error),
     ...series.map((one) => svg("path", { class: `share ${one.hand}`, d: areaPath(one.points, scales) })),
-    ...series.map((one) => svg("path", { class: `share-edge ${one.hand} ${one.mode}`, d: sharePath(one.points, scales) })),
+    ...series.map((one) =>
+      svg("path", { class: `share-edge ${one.hand} ${one.mode}`, d: sharePath(one.points, scales) }),
+    ),
     ...series.map((one) => svg("path", { class: `band ${one.hand}`, d: bandPath(one.points, scales) })),
     ...series.flatMap((one) => curve(one, scales)),
     mark,
   );
-  const readout = element("p", { className: "readout", role: "status", id: `readout-${(made += 1)}` }, HINT);
+  made += 1;
+  const readout = element("p", { className: "readout", role: "status", id: `readout-${made}` }, HINT);
   picture.setAttribute("aria-describedby", readout.id);
   let shown = null; // [series, point]
 
@@ -114,11 +123,20 @@ const reached = ({ points }) => points.filter(({ seconds }) => seconds !== null)
 
 function curve(one, scales) {
   const points = reached(one);
-  const d = points.map((point, i) => `${i ? "L" : "M"}${scales.x(point.margin)} ${scales.y(point.seconds)}`).join("");
+  const d = points
+    .map((point, i) => `${i ? "L" : "M"}${scales.x(point.margin)} ${scales.y(point.seconds)}`)
+    .join("");
   const dots = one.mode === "quick" ? points.filter((_, i) => i % 4 === 0) : [];
   return [
     svg("path", { class: `line ${one.hand} ${one.mode}`, d }),
-    ...dots.map((point) => svg("circle", { class: `dot ${one.hand}`, cx: scales.x(point.margin), cy: scales.y(point.seconds), r: 3 })),
+    ...dots.map((point) =>
+      svg("circle", {
+        class: `dot ${one.hand}`,
+        cx: scales.x(point.margin),
+        cy: scales.y(point.seconds),
+        r: 3,
+      }),
+    ),
   ];
 }
 
@@ -146,9 +164,25 @@ function axes(scales, error) {
       text({ x: BOX.left - 6, y: scales.y(seconds) + 4, "text-anchor": "end" }, seconds),
     ]),
     ...scales.shares.map((share) => text({ x: BOX.right + 6, y: scales.share(share) + 4 }, shareText(share))),
-    ...scales.margins.map((margin) => text({ x: scales.x(margin), y: BOX.bottom + 16, "text-anchor": "middle" }, margin)),
-    text({ x: (BOX.left + BOX.right) / 2, y: HEIGHT - 8, "text-anchor": "middle" }, `error margin [${unitOf(error)}]`),
-    text({ x: 12, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(-90 12 ${HEIGHT / 2 - 16})` }, "seconds"),
-    text({ x: WIDTH - 11, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(90 ${WIDTH - 11} ${HEIGHT / 2 - 16})` }, "share remaining"),
+    ...scales.margins.map((margin) =>
+      text({ x: scales.x(margin), y: BOX.bottom + 16, "text-anchor": "middle" }, margin),
+    ),
+    text(
+      { x: (BOX.left + BOX.right) / 2, y: HEIGHT - 8, "text-anchor": "middle" },
+      `error margin [${unitOf(error)}]`,
+    ),
+    text(
+      { x: 12, y: HEIGHT / 2 - 16, "text-anchor": "middle", transform: `rotate(-90 12 ${HEIGHT / 2 - 16})` },
+      "seconds",
+    ),
+    text(
+      {
+        x: WIDTH - 11,
+        y: HEIGHT / 2 - 16,
+        "text-anchor": "middle",
+        transform: `rotate(90 ${WIDTH - 11} ${HEIGHT / 2 - 16})`,
+      },
+      "share remaining",
+    ),
   ];
 }

@@ -14,7 +14,10 @@ export function setUpChoices(fields, onChange) {
   const selects = fields.map(({ name, label, options, all, chosen }) => {
     const select = element("select", { name });
     const choices = options.map((option) => (Array.isArray(option) ? option : [option, option]));
-    select.append(...(all ? [new Option(ALL, "")] : []), ...choices.map(([value, text]) => new Option(text, value)));
+    select.append(
+      ...(all ? [new Option(ALL, "")] : []),
+      ...choices.map(([value, text]) => new Option(text, value)),
+    );
     const wanted = asked.get(name) ?? chosen ?? "";
     if (choices.some(([value]) => value === wanted)) select.value = wanted;
     return element("label", { className: "field" }, element("span", {}, label), select);
@@ -35,7 +38,10 @@ export function setUpChoices(fields, onChange) {
 export const ERROR_FIELD = {
   name: "error",
   label: "Error",
-  options: [["translation", "translation"], ["rotation", "rotation"]],
+  options: [
+    ["translation", "translation"],
+    ["rotation", "rotation"],
+  ],
   all: true,
 };
 

@@ -15,7 +15,8 @@ export async function showStudy(studyId, message) {
   let newest = 0;
 
   async function show({ error, condition, ...asked }) {
-    const turn = (newest += 1);
+    newest += 1;
+    const turn = newest;
     byId("panels").setAttribute("aria-busy", "true");
     try {
       const report = await get(url, asked);
@@ -41,8 +42,22 @@ export async function showStudy(studyId, message) {
       ERROR_FIELD,
       field("scene", "Scene"),
       field("object", "Object"),
-      { name: "without_idle", label: "Idle time", options: [["false", "counts"], ["true", "left out"]] },
-      { name: "truth", label: "Truth", options: [["operators", "mean by hand"], ["reference", "reference pose"]] },
+      {
+        name: "without_idle",
+        label: "Idle time",
+        options: [
+          ["false", "counts"],
+          ["true", "left out"],
+        ],
+      },
+      {
+        name: "truth",
+        label: "Truth",
+        options: [
+          ["operators", "mean by hand"],
+          ["reference", "reference pose"],
+        ],
+      },
     ],
     show,
   );
@@ -77,9 +92,30 @@ function rotation({ gains }) {
   const rows = gains.map((gain) => {
     const told = (value) => errorText(value, gain.error);
     const intervals = ["before", "after", "gain"].map((name) => intervalText(gain[name], told));
-    return [...cellOf(gain), METHODS[gain.method].name, gain.moment, ...intervals, shareText(gain.improved), gain.gain.operators, gain.verdict];
+    return [
+      ...cellOf(gain),
+      METHODS[gain.method].name,
+      gain.moment,
+      ...intervals,
+      shareText(gain.improved),
+      gain.gain.operators,
+      gain.verdict,
+    ];
   });
-  const head = ["group", "mode", "condition", "error", "method", "from", "before", "after", "gain", "better", "operators", "verdict"];
+  const head = [
+    "group",
+    "mode",
+    "condition",
+    "error",
+    "method",
+    "from",
+    "before",
+    "after",
+    "gain",
+    "better",
+    "operators",
+    "verdict",
+  ];
   return section(
     "Does a snap improve rotation as well?",
     element("ul", {}, ...answers.map(({ sentence }) => element("li", {}, sentence))),
@@ -98,14 +134,26 @@ function handOffs({ cells }) {
       return withCaution([...which, from, errorText(point.best_margin, cell.error), saved], point.caution);
     }),
   );
-  const head = ["group", "mode", "condition", "error", "method", "let the machine take over from", "saves most at", "seconds saved there"];
+  const head = [
+    "group",
+    "mode",
+    "condition",
+    "error",
+    "method",
+    "let the machine take over from",
+    "saves most at",
+    "seconds saved there",
+  ];
   return rows.length ? section("Hand-off", tableOf(head, rows)) : null;
 }
 
 function fitts({ cells }) {
   const rows = cells.flatMap((cell) =>
     linesOf(cell).flatMap(({ hand, fitts: line, fitts_caution: caution }) =>
-      withCaution([...cellOf(cell), NAMES[hand], ...(line ? numbersOf(line, cell.error) : Array(6).fill("–"))], caution),
+      withCaution(
+        [...cellOf(cell), NAMES[hand], ...(line ? numbersOf(line, cell.error) : Array(6).fill("–"))],
+        caution,
+      ),
     ),
   );
   const head = ["group", "mode", "condition", "error", "by", "D", "margins", "a", "b a bit", "R²", "bits/s"];
@@ -132,23 +180,37 @@ function comparisons({ comparisons: pairs }) {
     intervalText(pair.translation, (value) => errorText(value, "translation")),
     intervalText(pair.rotation, (value) => errorText(value, "rotation")),
   ]);
-  const head = ["group", "mode", "difference", "pairs", "operators", "seconds", "final translation", "final rotation"];
+  const head = [
+    "group",
+    "mode",
+    "difference",
+    "pairs",
+    "operators",
+    "seconds",
+    "final translation",
+    "final rotation",
+  ];
   return rows.length ? section("Conditions in pairs", tableOf(head, rows)) : null;
 }
 
 function truths({ truths: places }) {
-  const both = (translation, turn) => `${errorText(translation, "translation")}, ${errorText(turn, "rotation")}`;
+  const both = (translation, turn) =>
+    `${errorText(translation, "translation")}, ${errorText(turn, "rotation")}`;
   const rows = places.map((place) => [
     place.name,
     place.registrations || "given",
     both(place.translation_spread, place.rotation_spread),
     place.from_reference === null ? "–" : both(...place.from_reference),
   ]);
-  return rows.length ? section("Ground truth", tableOf(["object", "registrations", "spread", "off the reference"], rows)) : null;
+  return rows.length
+    ? section("Ground truth", tableOf(["object", "registrations", "spread", "off the reference"], rows))
+    : null;
 }
 
 function method({ config, algorithm, cells }) {
-  const paper = cells.some(({ stg }) => stg.paper) ? `, by the paper’s filter with ${config.paper_seconds} s` : "";
+  const paper = cells.some(({ stg }) => stg.paper)
+    ? `, by the paper’s filter with ${config.paper_seconds} s`
+    : "";
   return section(
     "How the numbers are made",
     element(
@@ -167,10 +229,20 @@ function downloads({ tables }, url, { condition, ...asked }) {
     return element("a", { href: `${url}/files/${name}?${new URLSearchParams(given)}`, download: "" }, text);
   };
   const figure = { ...asked, condition };
-  const rows = tables.map((name) => [name.replace("_", "-"), link(`${name}.csv`, "CSV"), link(`${name}.parquet`, "Parquet")]);
+  const rows = tables.map((name) => [
+    name.replace("_", "-"),
+    link(`${name}.csv`, "CSV"),
+    link(`${name}.parquet`, "Parquet"),
+  ]);
   return section(
     "Download",
-    element("p", { className: "row" }, link("figure.svg", "Figure (SVG)", figure), link("figure.pdf", "Figure (PDF)", figure), link("report.html", "Report (HTML)")),
+    element(
+      "p",
+      { className: "row" },
+      link("figure.svg", "Figure (SVG)", figure),
+      link("figure.pdf", "Figure (PDF)", figure),
+      link("report.html", "Report (HTML)"),
+    ),
     tableOf(["table", "CSV", "Parquet"], rows),
   );
 }

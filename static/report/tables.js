@@ -12,7 +12,9 @@ export function section(title, ...children) {
 /** A table; cells are texts, numbers or elements. A row of one cell is about the row above, and as wide as the table. */
 export function tableOf(names, rows) {
   const head = element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)));
-  const body = rows.map((row) => element("tr", {}, ...row.map((cell) => cellOf(cell, row.length === 1 ? names.length : 1))));
+  const body = rows.map((row) =>
+    element("tr", {}, ...row.map((cell) => cellOf(cell, row.length === 1 ? names.length : 1))),
+  );
   const table = element("table", {}, element("thead", {}, head), element("tbody", {}, ...body));
   return element("div", { className: "table-frame", tabIndex: 0, role: "group" }, table);
 }
@@ -37,5 +39,8 @@ export function remarksSection(remarks) {
     const link = replayLink(id);
     return element("li", {}, `${about}: ${text}. `, link);
   });
-  return section("What was left out or handled", items.length ? element("ul", {}, ...items) : element("p", {}, "Nothing."));
+  return section(
+    "What was left out or handled",
+    items.length ? element("ul", {}, ...items) : element("p", {}, "Nothing."),
+  );
 }

@@ -17,18 +17,24 @@ export async function showTeam(message) {
   setText(byId("title"), "The team's work");
   setText(byId("crumb"), "Report of the team");
   const field = (name, label) => ({ name, label, options: choices[name], all: true });
-  await setUpChoices([field("operator", "Operator"), field("object", "Object"), field("week", "Week"), ERROR_FIELD], async ({ error, ...asked }) => {
-    try {
-      draw(await get(URL_OF_TEAM, asked), { errors: errorsOf({ error }), isSimulated: false });
-    } catch (problem) {
-      message.problem(problem);
-    }
-  });
+  await setUpChoices(
+    [field("operator", "Operator"), field("object", "Object"), field("week", "Week"), ERROR_FIELD],
+    async ({ error, ...asked }) => {
+      try {
+        draw(await get(URL_OF_TEAM, asked), { errors: errorsOf({ error }), isSimulated: false });
+      } catch (problem) {
+        message.problem(problem);
+      }
+    },
+  );
 }
 
 function draw(team, which) {
   const registrations = team.rows.reduce((sum, row) => sum + row.registrations, 0);
-  setText(byId("about"), `${count(registrations, "registration")} · the last pose of each counts as its truth · idle time is left out`);
+  setText(
+    byId("about"),
+    `${count(registrations, "registration")} · the last pose of each counts as its truth · idle time is left out`,
+  );
   drawPanels(team.cells, NAMES, which);
   byId("sections").replaceChildren(
     section("When to let the machine take over", advice(team.advice)),
@@ -40,13 +46,35 @@ function draw(team, which) {
 
 function advice(lines) {
   if (lines.length === 0) return element("p", {}, "Nothing is submitted yet.");
-  return element("ul", {}, ...lines.map(({ operator, text }) => element("li", {}, element("strong", {}, operator), ` ${text}`)));
+  return element(
+    "ul",
+    {},
+    ...lines.map(({ operator, text }) => element("li", {}, element("strong", {}, operator), ` ${text}`)),
+  );
 }
 
 function figures(rows) {
-  const head = ["operator", "object", "week", "registrations", "time each, without idle", "snaps each", "machine poses accepted", "drags after the snap"];
+  const head = [
+    "operator",
+    "object",
+    "week",
+    "registrations",
+    "time each, without idle",
+    "snaps each",
+    "machine poses accepted",
+    "drags after the snap",
+  ];
   return tableOf(
     head,
-    rows.map((row) => [row.operator, row.object, row.week, row.registrations, secondsText(row.active_seconds), digits(row.snaps), shareText(row.accepted), digits(row.drags_after)]),
+    rows.map((row) => [
+      row.operator,
+      row.object,
+      row.week,
+      row.registrations,
+      secondsText(row.active_seconds),
+      digits(row.snaps),
+      shareText(row.accepted),
+      digits(row.drags_after),
+    ]),
   );
 }

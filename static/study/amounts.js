@@ -21,7 +21,9 @@ export function amountsOf({ groups, modes, conditions, tasks, practice }, { minu
 
 /** What the times assume, and how the order is balanced. */
 export function noteOn({ groups }, { rows_of_balance: rows, orders, minutes_a_task: assumed }) {
-  const uneven = Object.entries(groups).filter(([, size]) => size % rows).map(([name]) => name);
+  const uneven = Object.entries(groups)
+    .filter(([, size]) => size % rows)
+    .map(([name]) => name);
   const times = Object.entries(assumed).map(([mode, each]) => `${each} min for a task in “${mode}”`);
   const balance = uneven.length
     ? `For an even balance groups need a multiple of ${count(rows, "participant")}; that is not so for ${uneven.join(", ")}.`

@@ -28,7 +28,8 @@ export function goToFirst(form) {
  * field is empty where the sentence is about the plan as a whole, or about none of its parts.
  */
 export function placedProblem(sentence) {
-  const [, part, index, text] = sentence.match(/^body(?:\.plan)?(?:\.([a-z_]+)(?:\.(\d+))?)?[^:]*: (.*)$/s) ?? [];
+  const [, part, index, text] =
+    sentence.match(/^body(?:\.plan)?(?:\.([a-z_]+)(?:\.(\d+))?)?[^:]*: (.*)$/s) ?? [];
   if (text === undefined) return ["", sentence];
   const said = part === "questions" && index ? `Question ${Number(index) + 1}: ${text}` : text;
   return [FIELDS[part] ?? part ?? "", said[0].toUpperCase() + said.slice(1)];

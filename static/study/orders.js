@@ -19,7 +19,13 @@ function cell(order, place, nameOf) {
   const isNew = !before || blockOf(before) !== blockOf(slot);
   const what = `${slot.is_practice ? "practice, " : ""}${slot.mode}, ${slot.condition}`;
   const block = element("strong", {}, isNew ? what : "");
-  return element("td", { className: isNew ? "new-block" : "" }, block, isNew ? element("br") : "", nameOf(slot.task));
+  return element(
+    "td",
+    { className: isNew ? "new-block" : "" },
+    block,
+    isNew ? element("br") : "",
+    nameOf(slot.task),
+  );
 }
 
 const blockOf = ({ is_practice: isPractice, mode, condition }) => `${isPractice} ${mode} ${condition}`;

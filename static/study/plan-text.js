@@ -19,5 +19,8 @@ export function questionsOf(text) {
 }
 
 function listOf(text, separator) {
-  return text.split(separator).map((part) => part.trim()).filter(Boolean);
+  return text
+    .split(separator)
+    .map((part) => part.trim())
+    .filter(Boolean);
 }

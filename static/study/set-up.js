@@ -92,7 +92,9 @@ export async function showSetUp(pageMessage) {
   /** By field, what is wrong with the form as it is. */
   function problems() {
     const own = { ...lacking(plan()), ...wrongText(taken) };
-    return Object.fromEntries(Object.entries({ [fromServer[0]]: fromServer[1], ...own }).filter(([, text]) => text));
+    return Object.fromEntries(
+      Object.entries({ [fromServer[0]]: fromServer[1], ...own }).filter(([, text]) => text),
+    );
   }
 
   function showWhatIsWrong() {
@@ -172,11 +174,15 @@ async function fillFromDescription() {
   const plan = components.schemas.StudyPlan.properties;
   for (const name of ["modes", "conditions"]) {
     const { items, default: first } = plan[name];
-    byId(`${name}-ticks`).replaceChildren(...items.enum.map((value) => tick(name, value, first.includes(value))));
+    byId(`${name}-ticks`).replaceChildren(
+      ...items.enum.map((value) => tick(name, value, first.includes(value))),
+    );
   }
   const modes = plan.modes.items.enum;
   for (const mode of modes) byId(`instructions-${mode}`).value = plan.instructions.default[mode];
-  byId("groups").value = Object.entries(plan.groups.default).map((group) => group.join(" ")).join(", ");
+  byId("groups").value = Object.entries(plan.groups.default)
+    .map((group) => group.join(" "))
+    .join(", ");
   byId("break-after").value = plan.break_after.default;
   return modes;
 }
@@ -208,7 +214,11 @@ function wrongText(taken) {
   const name = byId("name").value.trim();
   const whole = (id, words) => (byId(id).validity.valid ? "" : `Write a whole number ${words}.`);
   return {
-    name: name ? (taken.has(name) ? `There already is a study “${name}”: choose another name.` : "") : "Give the study a name.",
+    name: name
+      ? taken.has(name)
+        ? `There already is a study “${name}”: choose another name.`
+        : ""
+      : "Give the study a name.",
     groups: wrongGroups(groupsOf(byId("groups").value)),
     "break-after": whole("break-after", "from 0 to 1000; 0 means no breaks"),
     seed: whole("seed", "from 0 on"),

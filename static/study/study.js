@@ -30,7 +30,9 @@ export async function showStudy(id, message) {
   const url = `/api/studies/${id}`;
   let study = null;
 
-  byId("close-study").addEventListener("click", () => askFirst(CLOSE, () => tried(() => post(`${url}/close`))));
+  byId("close-study").addEventListener("click", () =>
+    askFirst(CLOSE, () => tried(() => post(`${url}/close`))),
+  );
   await refresh();
   byId("study").hidden = false;
   setInterval(() => refresh().catch(message.problem), REFRESH_MS);

@@ -24,7 +24,8 @@ export function thingList(onChange) {
     for (const thing of tasks.map(thingOf)) {
       const key = keyOf(thing.ref);
       keys.add(key);
-      if (!things.has(key)) things.set(key, { ...thing, row: rowOf(thing, (use) => change(things.get(key), use)) });
+      if (!things.has(key))
+        things.set(key, { ...thing, row: rowOf(thing, (use) => change(things.get(key), use)) });
     }
     here = [...keys].map((key) => things.get(key));
     byId("thing-rows").replaceChildren(...here.map(({ row }) => row));
@@ -75,8 +76,16 @@ export function thingList(onChange) {
 }
 
 function rowOf({ name, scene, url }, onUse) {
-  const uses = [["not used", ""], ["counts", "task"], ["for practice", "practice"]];
-  const choice = element("select", { "aria-label": `${name}, ${scene}` }, ...uses.map(([text, use]) => new Option(text, use)));
+  const uses = [
+    ["not used", ""],
+    ["counts", "task"],
+    ["for practice", "practice"],
+  ];
+  const choice = element(
+    "select",
+    { "aria-label": `${name}, ${scene}` },
+    ...uses.map(([text, use]) => new Option(text, use)),
+  );
   choice.addEventListener("change", () => onUse(choice.value));
   const text = element("span", {}, name, element("small", {}, scene));
   return element("div", { className: "thing" }, picture(url, "thing-picture", { lazy: true }), text, choice);
