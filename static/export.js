@@ -1,10 +1,10 @@
 /** Export: choose a dataset, start the job, see the gate's verdict, download. */
 
-import { get, getAll, post } from "./api.js";
-import { byId, element, icon, setText } from "./dom.js";
-import { count, fileSize } from "./format.js";
-import { messageArea } from "./message.js";
-import { openPage } from "./page.js";
+import { get, getAll, post } from "./shared/api.js";
+import { byId, element, icon, setText } from "./shared/dom.js";
+import { count, fileSize } from "./shared/format.js";
+import { messageArea } from "./shared/message.js";
+import { openPage } from "./shared/page.js";
 
 const POLL_MS = 500;
 const STATES = {

@@ -1,8 +1,8 @@
 /** Sign-in: with name and password, or by the one-time link /sign-in#TOKEN. */
 
-import { post } from "./api.js";
-import { byId } from "./dom.js";
-import { messageArea } from "./message.js";
+import { post } from "./shared/api.js";
+import { byId } from "./shared/dom.js";
+import { messageArea } from "./shared/message.js";
 
 const form = byId("sign-in");
 const message = messageArea(byId("message"));

@@ -1,9 +1,9 @@
 /** The "Add tasks" dialog: choose a scene, look at its picture, tick the objects that are in it. */
 
-import { get, getAll, post } from "../api.js";
-import { byId, element, picture, setText } from "../dom.js";
-import { count, METHODS } from "../format.js";
-import { messageArea } from "../message.js";
+import { get, getAll, post } from "../shared/api.js";
+import { byId, element, picture, setText } from "../shared/dom.js";
+import { count, METHODS } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
 
 /** `onAdded(number)` is called after tasks were made. */
 export function setUpAddTasks(onAdded) {

@@ -1,8 +1,8 @@
 /** The datasets with their progress; pressing one shows only its tasks. */
 
-import { getAll } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
-import { count, percent } from "../format.js";
+import { getAll } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
+import { count, percent } from "../shared/format.js";
 import { openWarnings as warningsOf } from "./warnings.js";
 
 const ASK_AGAIN_MS = 1000;

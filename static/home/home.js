@@ -1,9 +1,9 @@
 /** Home: the next task, the datasets and the tasks, with import and "add tasks" for administrators. */
 
-import { byId } from "../dom.js";
-import { count, percent } from "../format.js";
-import { messageArea } from "../message.js";
-import { openPage } from "../page.js";
+import { byId } from "../shared/dom.js";
+import { count, percent } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
+import { openPage } from "../shared/page.js";
 import { setUpAddTasks } from "./add-tasks.js";
 import { showDatasets } from "./datasets.js";
 import { setUpImport } from "./import.js";

@@ -1,9 +1,9 @@
 /** The import dialog: a zip is uploaded with progress, then checked and stored by the server. */
 
-import { goToSignIn, problemSentence, UNREACHABLE } from "../api.js";
-import { byId, setText } from "../dom.js";
-import { fileSize } from "../format.js";
-import { messageArea } from "../message.js";
+import { goToSignIn, problemSentence, UNREACHABLE } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { fileSize } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
 
 /** `onImported(dataset)` is called after a successful import. */
 export function setUpImport(onImported) {

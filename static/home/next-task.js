@@ -1,8 +1,8 @@
 /** "My next task": the one big button. */
 
-import { nextTask } from "../api.js";
-import { byId, element, icon, picture } from "../dom.js";
-import { addressWith } from "../task-filter.js";
+import { nextTask } from "../shared/api.js";
+import { byId, element, icon, picture } from "../shared/dom.js";
+import { addressWith } from "../shared/task-filter.js";
 
 /** Shows the next task of a dataset, or of all; without one, says so. Hidden while there are no tasks at all. */
 export async function showNextTask(datasets, datasetId) {

@@ -1,9 +1,9 @@
 /** The "Risk" dialog: how many wrong poses a dataset allows the machine to accept, and what that asks for. */
 
-import { get, put } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
-import { count, percent } from "../format.js";
-import { messageArea } from "../message.js";
+import { get, put } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
+import { count, percent } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
 
 const CHOICES = [0.01, 0.02, 0.05, 0.1];
 const OTHER = "other";

@@ -1,10 +1,10 @@
 /** The tasks as cards, filtered by dataset, scene, state, mode and condition. The filter is kept in the page's address. */
 
-import { get, getAll } from "../api.js";
-import { verdictMark } from "../assessment.js";
-import { byId, element, icon, picture, setText } from "../dom.js";
-import { count, METHODS } from "../format.js";
-import { addressWith, CHOICES, filterIn, isNarrow } from "../task-filter.js";
+import { get, getAll } from "../shared/api.js";
+import { verdictMark } from "../shared/assessment.js";
+import { byId, element, icon, picture, setText } from "../shared/dom.js";
+import { count, METHODS } from "../shared/format.js";
+import { addressWith, CHOICES, filterIn, isNarrow } from "../shared/task-filter.js";
 import { keepPlace } from "./place.js";
 
 const PAGE = 48;

@@ -1,9 +1,9 @@
 /** The "What looked odd" dialog: what an import found strange in a dataset but took, until a lead accepts it. */
 
-import { post } from "../api.js";
-import { byId, element, setText } from "../dom.js";
-import { count } from "../format.js";
-import { messageArea } from "../message.js";
+import { post } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { count } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
 
 /** Those that nobody has accepted yet. */
 export const openWarnings = ({ warnings }) => warnings.filter(({ accepted }) => !accepted);

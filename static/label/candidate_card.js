@@ -1,7 +1,7 @@
 /** A pose to choose, as a picture: a piece of the colour image with the object's outline drawn in. */
 
-import { element, rgb } from "../dom.js";
-import { extentInPicture, shownCamera } from "./outline.js";
+import { element, rgb } from "../shared/dom.js";
+import { extentInPicture, shownCamera } from "../shared/drawing/outline.js";
 
 const FILLED = 0.62; // share of the picture that the object takes, so that its surroundings are seen
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image

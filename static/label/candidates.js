@@ -1,10 +1,10 @@
 /** Poses to choose from, as pictures: where the machine found the object, or what fits the depth alike. */
 
-import { del, get } from "../api.js";
-import { byId, setText } from "../dom.js";
+import { del, get } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { sharedDrawing } from "../shared/drawing/outline.js";
+import { product } from "../shared/drawing/pose.js";
 import { candidateCard, drawCard } from "./candidate_card.js";
-import { sharedDrawing } from "./outline.js";
-import { product } from "./pose.js";
 
 const LEAST_WEIGHT = 0.05; // of a mode that is worth a look
 const MOST_FOUND = 5; // that are worth one

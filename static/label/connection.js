@@ -1,7 +1,7 @@
 /** The connection of the 3-D view, which has one of its own beside that of the page. */
 
-import { byId } from "../dom.js";
-import { focusView } from "./view.js";
+import { byId } from "../shared/dom.js";
+import { focusView } from "../shared/view.js";
 
 const RETRY_MS = 1000;
 

@@ -1,8 +1,8 @@
 /** Copying a pose from a neighbouring frame of the video, or from another operator. */
 
-import { get } from "../api.js";
-import { byId, element, picture } from "../dom.js";
-import { POSED_BY } from "../posed-by.js";
+import { get } from "../shared/api.js";
+import { byId, element, picture } from "../shared/dom.js";
+import { POSED_BY } from "../shared/posed-by.js";
 
 /** A part of the labelling page. */
 export function copyPart(page) {

@@ -1,6 +1,6 @@
 /** The end of a task: skipping it with a reason, what comes next, and going back to it. */
 
-import { byId, setText } from "../dom.js";
+import { byId, setText } from "../shared/dom.js";
 import { showNext } from "./next.js";
 import { possible } from "./panel.js";
 

@@ -1,7 +1,7 @@
 /** Finding the object without a start: the machine looks where in the frame it may be. */
 
-import { del, post } from "../api.js";
-import { byId } from "../dom.js";
+import { del, post } from "../shared/api.js";
+import { byId } from "../shared/dom.js";
 import { possible } from "./panel.js";
 
 /** A part of the labelling page; what is found is shown by `candidates.js`. */

@@ -1,7 +1,7 @@
 /** The first task, step by step: one hint at a time, checked off when what it asks for has happened. */
 
-import { byId, element, setText } from "../dom.js";
-import { MOD } from "./keys.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { MOD } from "../shared/keys.js";
 
 const TURNED = 30; // page pixels of a drag beside the object that turn the view visibly
 

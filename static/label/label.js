@@ -8,18 +8,19 @@
  * takes what it shows, likewise.
  */
 
-import { del, get, post, put } from "../api.js";
-import { byId, setText } from "../dom.js";
-import { messageArea } from "../message.js";
+import { del, get, post, put } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { imagePart } from "../shared/drawing/image.js";
+import { setUpHelp } from "../shared/help.js";
+import { keyBindings, releaseFocusAfterPointer } from "../shared/keys.js";
+import { messageArea } from "../shared/message.js";
+import { closeView, focusView, openView } from "../shared/view.js";
 import { candidatesPart } from "./candidates.js";
 import { connectionPart } from "./connection.js";
 import { copyPart } from "./copy.js";
 import { endingPart } from "./ending.js";
 import { findPart } from "./find.js";
 import { guidePart } from "./guide.js";
-import { setUpHelp } from "./help.js";
-import { imagePart } from "./image.js";
-import { keyBindings, releaseFocusAfterPointer } from "./keys.js";
 import { machinePart } from "./machine.js";
 import { methodPart } from "./method.js";
 import { goToNext } from "./next.js";
@@ -39,7 +40,6 @@ import { threePointsPart } from "./three-points.js";
 import { showTools } from "./tools.js";
 import { trialPart } from "./trial.js";
 import { uncertaintyPart } from "./uncertainty.js";
-import { closeView, focusView, openView } from "./view.js";
 import { viewRingPart } from "./view-ring.js";
 import { viewsPart } from "./views.js";
 import { isSnapping, waitingPart } from "./waiting.js";

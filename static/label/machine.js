@@ -2,9 +2,9 @@
  * What the machine does of its own accord: live snapping, taking over in `auto`, and what it suggests quietly.
  */
 
-import { drawAssessment } from "../assessment.js";
-import { byId, setText } from "../dom.js";
-import { MOD } from "./keys.js";
+import { drawAssessment } from "../shared/assessment.js";
+import { byId, setText } from "../shared/dom.js";
+import { MOD } from "../shared/keys.js";
 import { possible } from "./panel.js";
 
 const REMEMBERED = "snap6d.live";

@@ -1,6 +1,6 @@
 /** Numbered marks over a picture. */
 
-import { element } from "../dom.js";
+import { element } from "../shared/dom.js";
 
 /** Numbers {x, y, isHidden} [page pixels from the corner of `layer`] from 1 on, in place of the marks before. */
 export function drawMarks(layer, places) {

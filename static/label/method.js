@@ -1,7 +1,7 @@
 /** What Snap computes with; put away where the task's condition leaves no choice. */
 
-import { byId } from "../dom.js";
-import { METHODS } from "../format.js";
+import { byId } from "../shared/dom.js";
+import { METHODS } from "../shared/format.js";
 
 /** A part of the labelling page. */
 export function methodPart(page) {

@@ -1,8 +1,8 @@
 /** What comes after a task: the next one of those that its operator works on. */
 
-import { nextTask } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
-import { addressWith, filterIn, isNarrow } from "../task-filter.js";
+import { nextTask } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
+import { addressWith, filterIn, isNarrow } from "../shared/task-filter.js";
 
 let shown = Promise.resolve();
 

@@ -1,6 +1,6 @@
 /** The pose of the object in the camera as numbers, which can be typed over. */
 
-import { poseNumbers, product, withNumber } from "./pose.js";
+import { poseNumbers, product, withNumber } from "../shared/drawing/pose.js";
 
 /** A part of the labelling page. */
 export function numbersPart(page) {

@@ -1,6 +1,6 @@
 /** Who else has this task open now; each works on a registration of their own. */
 
-import { byId, setText } from "../dom.js";
+import { byId, setText } from "../shared/dom.js";
 
 /** A part of the labelling page. */
 export function othersPart() {

@@ -1,9 +1,9 @@
 /** Draws a registration into the panel; knows nothing of the server. */
 
-import { drawAssessment } from "../assessment.js";
-import { byId, setText } from "../dom.js";
-import { framesText } from "../format.js";
-import { drawPoser } from "../posed-by.js";
+import { drawAssessment } from "../shared/assessment.js";
+import { byId, setText } from "../shared/dom.js";
+import { framesText } from "../shared/format.js";
+import { drawPoser } from "../shared/posed-by.js";
 import { hintFor } from "./hint.js";
 import { isSnapping, snappingText, waitingText } from "./waiting.js";
 

@@ -1,6 +1,6 @@
 /** Placing the object by a double click on the cloud or the colour image, or by a click after a key. */
 
-import { byId } from "../dom.js";
+import { byId } from "../shared/dom.js";
 import { scenePointing } from "./pointing.js";
 
 /** A part of the labelling page. */

@@ -1,9 +1,8 @@
 /** Pointing at the scene by a click: in the 3-D view, or in the colour image. */
 
-import { byId } from "../dom.js";
+import { distance, LARGEST_CLICK } from "../shared/click.js";
+import { byId } from "../shared/dom.js";
 
-/** Pixels; a pointer that moved farther has dragged. */
-export const LARGEST_CLICK = 4;
 const CROSSHAIR = ".placing canvas { cursor: crosshair !important }";
 
 /**
@@ -67,11 +66,6 @@ export function scenePointing(page, onPoint, onDouble = () => {}) {
 
 function placeInView(view, { clientX, clientY }) {
   return { across: clientX / view.innerWidth, down: clientY / view.innerHeight };
-}
-
-/** How far a pointer has moved between two events [pixels]. */
-export function distance(one, other) {
-  return Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
 }
 
 /** The page's {x, y} of a pixel of the image, however it is scaled or shifted. */

@@ -1,6 +1,6 @@
 /** Small and exact changes of the pose: nudges by key, quarter turns, flips, putting down; the gizmo's axes. */
 
-import { byId, setText } from "../dom.js";
+import { byId, setText } from "../shared/dom.js";
 
 /** Millimetres and degrees alike. */
 const STEPS = [0.5, 2, 10];

@@ -1,7 +1,7 @@
 /** Seeing whether the pose is right: how depth agrees with it, and what the 3-D view shows or puts away. */
 
-import { byId, setText } from "../dom.js";
-import { drawsFinely, rememberedLayers, rememberLayers } from "./fineness.js";
+import { byId, setText } from "../shared/dom.js";
+import { drawsFinely, rememberedLayers, rememberLayers } from "../shared/fineness.js";
 
 const AT_FIRST = { cloud: true, mesh: true, texture: true, fine: true, agreement: false };
 

@@ -1,8 +1,8 @@
 /** Signing in without leaving the page, where the login has ended: the page then goes on where it was. */
 
-import { get, onSignedOut, post, whoIsSignedIn } from "../api.js";
-import { byId, setText } from "../dom.js";
-import { messageArea } from "../message.js";
+import { get, onSignedOut, post, whoIsSignedIn } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
+import { messageArea } from "../shared/message.js";
 
 const HOME = { label: "Back to the tasks", run: () => location.assign("/") };
 

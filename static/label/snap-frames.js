@@ -1,6 +1,6 @@
 /** The frames that Snap uses: those that see the object, or this one alone, as this browser remembers. */
 
-import { byId } from "../dom.js";
+import { byId } from "../shared/dom.js";
 
 const REMEMBERED = "snap6d.snap-frames";
 

@@ -1,6 +1,6 @@
 /** The registration as it changes, by server-sent events that reconnect by themselves. */
 
-import { ApiError } from "../api.js";
+import { ApiError } from "../shared/api.js";
 
 const RETRY_MS = 1000;
 /** The server tells something every ten seconds: after a longer silence the connection is dead, as after a sleep. */

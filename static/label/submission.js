@@ -1,7 +1,7 @@
 /** Submitting a pose; one that looks unfinished is asked about first, beside the button. */
 
-import { byId, setText } from "../dom.js";
-import { percent } from "../format.js";
+import { byId, setText } from "../shared/dom.js";
+import { percent } from "../shared/format.js";
 import { possible } from "./panel.js";
 
 const LEAST_AGREEMENT = 0.5; // a pose that is 4 mm and 4° off has about 0.7, one of 8 mm and 8° less than this

@@ -1,6 +1,6 @@
 /** The image large in the place of the 3-D view, and the view small in that of the image. */
 
-import { byId, setText } from "../dom.js";
+import { byId, setText } from "../shared/dom.js";
 
 /** A part of the labelling page. */
 export function swapPart() {

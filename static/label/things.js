@@ -1,7 +1,7 @@
 /** What else is in the scene: a list that leads to it, and whether the 3-D view shows what is done. */
 
-import { get, put } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
+import { get, put } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
 
 const HIDDEN = "snap6d.things.hidden";
 const OPENED = "snap6d.things.open";

@@ -1,12 +1,12 @@
 /** Three points: the object is placed by points clicked on it and, in the same order, in the cloud or the image. */
 
-import { post, put } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
+import { post, put } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
+import { objectView } from "../shared/drawing/object-view.js";
+import { relativeTo } from "../shared/drawing/pose.js";
+import { objectDrawing } from "../shared/drawing/textured.js";
 import { drawMarks } from "./marks.js";
-import { objectView } from "./object-view.js";
 import { placeOfPixel, scenePointing } from "./pointing.js";
-import { relativeTo } from "./pose.js";
-import { objectDrawing } from "./textured.js";
 
 const LEAST = 3;
 

@@ -3,8 +3,8 @@
  * What is for ordinary work alone is marked `data-ordinary`, what is for trials alone `data-trial`.
  */
 
-import { get } from "../api.js";
-import { byId, setText } from "../dom.js";
+import { get } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
 
 const SECOND_MS = 1000;
 

@@ -1,7 +1,7 @@
 /** How far off the machine's pose may be, and what depth cannot tell about it. */
 
-import { get, put } from "../api.js";
-import { byId, element, setText } from "../dom.js";
+import { get, put } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
 
 const DEGREES = 180 / Math.PI;
 const REMEMBERED = "snap6d.uncertainty";

@@ -3,7 +3,7 @@
  * came by a key.
  */
 
-import { byId } from "../dom.js";
+import { byId } from "../shared/dom.js";
 
 /** A part of the labelling page. */
 export function viewRingPart() {

@@ -1,7 +1,7 @@
 /** Looking at the object from elsewhere. */
 
-import { post } from "../api.js";
-import { byId } from "../dom.js";
+import { post } from "../shared/api.js";
+import { byId } from "../shared/dom.js";
 
 /** A part of the labelling page; the view's element is told by the event `looked`. */
 export function viewsPart(page) {

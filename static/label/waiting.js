@@ -1,7 +1,7 @@
 /** A snap under way: whether it waits for a worker, or keeps one long, and since when. */
 
-import { get } from "../api.js";
-import { byId, setText } from "../dom.js";
+import { get } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
 
 const PATIENCE_MS = 2000;
 const ASK_AGAIN_MS = 1000;

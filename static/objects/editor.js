@@ -1,7 +1,7 @@
 /** The form for an axis by numbers, or by two points that are picked on the mesh. */
 
-import { post } from "../api.js";
-import { byId, setText } from "../dom.js";
+import { post } from "../shared/api.js";
+import { byId, setText } from "../shared/dom.js";
 import { foldText, HIGHEST_FOLD, normalized, residualText } from "./axes.js";
 
 const DIGITS = 4; // of a direction and of millimetres

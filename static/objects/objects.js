@@ -1,10 +1,10 @@
 /** Objects: a list of a dataset's, and one of them turning, with its symmetries and what a lead decides of them. */
 
-import { get, getAll, put } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
-import { objectDrawing } from "../label/textured.js";
-import { messageArea } from "../message.js";
-import { openPage } from "../page.js";
+import { get, getAll, put } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
+import { objectDrawing } from "../shared/drawing/textured.js";
+import { messageArea } from "../shared/message.js";
+import { openPage } from "../shared/page.js";
 import { axisText, groupText, isAlong, residualText } from "./axes.js";
 import { axisEditor, residualOf } from "./editor.js";
 import { stageOf } from "./stage.js";

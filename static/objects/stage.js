@@ -1,8 +1,8 @@
 /** The object in 3-D: turned by hand or slowly by itself, with its axes, and moved by a symmetry's turns. */
 
-import { rgb, svg } from "../dom.js";
-import { objectView } from "../label/object-view.js";
-import { rotationMatrix } from "../label/pose.js";
+import { rgb, svg } from "../shared/dom.js";
+import { objectView } from "../shared/drawing/object-view.js";
+import { rotationMatrix } from "../shared/drawing/pose.js";
 
 const FIRST_EYE = [0.5, -0.75, 0.43]; // seen from the object: its x goes to the right and towards us, z up
 const SPIN = 0.5; // radians a second

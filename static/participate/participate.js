@@ -1,8 +1,8 @@
 /** Taking part in a study: from the link, screen by screen, to the tasks and back, until the thanks. */
 
-import { ApiError, get, onSignedOut, post, whoIsSignedIn } from "../api.js";
-import { byId, element, setText } from "../dom.js";
-import { messageArea } from "../message.js";
+import { ApiError, get, onSignedOut, post, whoIsSignedIn } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { messageArea } from "../shared/message.js";
 
 const MODES = { accurate: "As accurately as you can", quick: "As quickly as you can" };
 const TOOLS = {

@@ -1,7 +1,7 @@
 /** The list of events, and going from one to the next. */
 
-import { byId, element, icon } from "../dom.js";
-import { framesText, METHODS } from "../format.js";
+import { byId, element, icon } from "../shared/dom.js";
+import { framesText, METHODS } from "../shared/format.js";
 import { clockText } from "./clock.js";
 
 const WORDS = {

@@ -4,15 +4,15 @@
  * The page is the clock; what there was to see at a time is asked of the server, which moves the 3-D view with it.
  */
 
-import { get, post, put } from "../api.js";
-import { drawAssessment } from "../assessment.js";
-import { byId, setText } from "../dom.js";
-import { setUpHelp } from "../label/help.js";
-import { imagePart } from "../label/image.js";
-import { keyBindings, releaseFocusAfterPointer } from "../label/keys.js";
-import { openView } from "../label/view.js";
-import { messageArea } from "../message.js";
-import { drawPoser } from "../posed-by.js";
+import { get, post, put } from "../shared/api.js";
+import { drawAssessment } from "../shared/assessment.js";
+import { byId, setText } from "../shared/dom.js";
+import { imagePart } from "../shared/drawing/image.js";
+import { setUpHelp } from "../shared/help.js";
+import { keyBindings, releaseFocusAfterPointer } from "../shared/keys.js";
+import { messageArea } from "../shared/message.js";
+import { drawPoser } from "../shared/posed-by.js";
+import { openView } from "../shared/view.js";
 import { clockText, playbackClock } from "./clock.js";
 import { eventList } from "./events.js";
 import { presenter } from "./presenter.js";

@@ -1,6 +1,6 @@
 /** The time line: signs of the events in lanes, idle stretches, and the curve above them. */
 
-import { byId, element, svg } from "../dom.js";
+import { byId, element, svg } from "../shared/dom.js";
 import { curvePaths, curveTicks } from "./curve.js";
 import { LANE_HEIGHT, laneTop, SIGNS } from "./signs.js";
 

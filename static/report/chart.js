@@ -3,8 +3,8 @@
  * opens the replay behind it.
  */
 
-import { element, svg } from "../dom.js";
-import { count } from "../format.js";
+import { element, svg } from "../shared/dom.js";
+import { count } from "../shared/format.js";
 import { digits, secondsText, shareText, unitOf } from "./numbers.js";
 import { BOX, HEIGHT, scalesOf, WIDTH } from "./scales.js";
 

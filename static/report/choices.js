@@ -1,6 +1,6 @@
 /** The choices above a report, kept in the page's address. */
 
-import { byId, element } from "../dom.js";
+import { byId, element } from "../shared/dom.js";
 
 const ALL = "All";
 

@@ -1,6 +1,6 @@
 /** The curves of a report: charts with their legend, and the same as a table. */
 
-import { byId, element } from "../dom.js";
+import { byId, element } from "../shared/dom.js";
 import { chart, legendEntry } from "./chart.js";
 import { digits, inPeopleUnits, secondsText, shareText, unitOf } from "./numbers.js";
 import { replayLink, section, tableOf } from "./tables.js";

@@ -1,8 +1,8 @@
 /** A report: of a study, or of the team's ordinary work. */
 
-import { byId } from "../dom.js";
-import { messageArea } from "../message.js";
-import { openPage } from "../page.js";
+import { byId } from "../shared/dom.js";
+import { messageArea } from "../shared/message.js";
+import { openPage } from "../shared/page.js";
 import { showStudy } from "./study.js";
 import { showTeam } from "./team.js";
 

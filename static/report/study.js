@@ -1,8 +1,8 @@
 /** The report of a study. */
 
-import { get } from "../api.js";
-import { byId, element, setText } from "../dom.js";
-import { count, METHODS } from "../format.js";
+import { get } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { count, METHODS } from "../shared/format.js";
 import { ERROR_FIELD, errorsOf, setUpChoices } from "./choices.js";
 import { digits, errorText, intervalText, secondsText, shareText } from "./numbers.js";
 import { curvesSection, drawPanels, linesOf } from "./panels.js";

@@ -1,6 +1,6 @@
 /** Sections and tables of reports. */
 
-import { element, icon } from "../dom.js";
+import { element, icon } from "../shared/dom.js";
 
 /** A part of the page with a heading. */
 export function section(title, ...children) {

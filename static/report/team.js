@@ -1,8 +1,8 @@
 /** The same curves from ordinary work, with figures and an advice for each operator. */
 
-import { get } from "../api.js";
-import { byId, element, setText } from "../dom.js";
-import { count } from "../format.js";
+import { get } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { count } from "../shared/format.js";
 import { ERROR_FIELD, errorsOf, setUpChoices } from "./choices.js";
 import { digits, secondsText, shareText } from "./numbers.js";
 import { curvesSection, drawPanels } from "./panels.js";

@@ -1,7 +1,7 @@
 /** What a plan amounts to: tasks, minutes and operators, and whether its order is balanced. */
 
-import { element } from "../dom.js";
-import { count } from "../format.js";
+import { element } from "../shared/dom.js";
+import { count } from "../shared/format.js";
 
 const MINUTES_AN_HOUR = 60;
 

@@ -1,6 +1,6 @@
 /** What is wrong in a form, in one sentence under the field that it is about. */
 
-import { setText } from "../dom.js";
+import { setText } from "../shared/dom.js";
 
 const FIELDS = { tasks: "things", practice: "things", break_after: "break-after" }; // of parts that are called otherwise
 

@@ -1,6 +1,6 @@
 /** The order of a study as a table: an operator a column, their tasks from top to bottom. */
 
-import { element } from "../dom.js";
+import { element } from "../shared/dom.js";
 
 /** `orders` as the server previews them; `nameOf(task)` says what a task asks for. */
 export function showOrders(orders, nameOf) {

@@ -1,9 +1,9 @@
 /** Setting a study up: a form, and beside it what it amounts to and the order that it leads to. */
 
-import { get, getAll, post } from "../api.js";
-import { byId, element, setText } from "../dom.js";
-import { count } from "../format.js";
-import { messageArea } from "../message.js";
+import { get, getAll, post } from "../shared/api.js";
+import { byId, element, setText } from "../shared/dom.js";
+import { count } from "../shared/format.js";
+import { messageArea } from "../shared/message.js";
 import { amountsOf, noteOn } from "./amounts.js";
 import { goToFirst, placedProblem, showProblems } from "./field-problems.js";
 import { showOrders } from "./orders.js";

@@ -1,9 +1,9 @@
 /** Studies, for administrators: the list (/studies), setting one up (?new), and one of them (?study=ID). */
 
-import { getAll } from "../api.js";
-import { byId, element } from "../dom.js";
-import { messageArea } from "../message.js";
-import { openPage } from "../page.js";
+import { getAll } from "../shared/api.js";
+import { byId, element } from "../shared/dom.js";
+import { messageArea } from "../shared/message.js";
+import { openPage } from "../shared/page.js";
 import { showSetUp } from "./set-up.js";
 import { showStudy } from "./study.js";
 

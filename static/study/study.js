@@ -1,7 +1,7 @@
 /** One study: its participants and how far they are, their links, and its end. */
 
-import { del, get, post } from "../api.js";
-import { byId, element, icon, setText } from "../dom.js";
+import { del, get, post } from "../shared/api.js";
+import { byId, element, icon, setText } from "../shared/dom.js";
 import { askFirst } from "./sure.js";
 
 const REFRESH_MS = 10_000;

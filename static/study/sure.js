@@ -1,6 +1,6 @@
 /** Asks once more before what cannot be taken back. */
 
-import { byId, setText } from "../dom.js";
+import { byId, setText } from "../shared/dom.js";
 
 /** Runs `run` where the person says yes; `question` is {title, text, yes}. */
 export function askFirst({ title, text, yes }, run) {

@@ -1,7 +1,7 @@
 /** Objects in scenes, to choose from for a study: found by name, used one by one or all that are shown. */
 
-import { byId, element, picture, setText } from "../dom.js";
-import { count } from "../format.js";
+import { byId, element, picture, setText } from "../shared/dom.js";
+import { count } from "../shared/format.js";
 
 const FOUND = "Nothing is called so: change or empty the two searches.";
 const NO_TASKS = "This dataset has no tasks yet: add some on the home page first.";

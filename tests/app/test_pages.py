@@ -12,6 +12,7 @@ from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 
 PAGES = sorted(STATIC.glob("*.html"))
+SHARED = STATIC / "shared"
 FILES = sorted(path for path in STATIC.rglob("*") if path.is_file())
 SVG_NAMESPACE = "http://www.w3.org/2000/svg"
 IMPORT = r"""^(?:import\s[^;"']*|export\s*[*{][^;"']*from\s*)["']([^"']+)["']"""
@@ -222,5 +223,7 @@ def test_a_script_imports_what_is_there_and_makes_no_code(script) -> None:
     content = script.read_text()
     for name in re.findall(IMPORT, content, re.MULTILINE):
         assert name.startswith("."), name
-        assert (script.parent / name).resolve().is_file(), name
+        imported = (script.parent / name).resolve()
+        assert imported.is_file(), name
+        assert SHARED not in script.parents or SHARED in imported.parents, "what pages share knows no page"
     assert not re.findall(r"\beval\(|new Function\(|\.innerHTML\s*=|document\.write", content)

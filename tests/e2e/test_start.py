@@ -26,7 +26,7 @@ pytestmark = pytest.mark.e2e
 Array = NDArray[np.float64]
 
 DISTANCE, FILLED = 4.0, 0.84
-"""How the view of the object stands to its sphere, as in static/label/object-view.js."""
+"""How the view of the object stands to its sphere, as in static/shared/drawing/object-view.js."""
 SLOW = 60_000
 """Milliseconds: what an answer may take on a busy machine."""
 TURN = 0.01

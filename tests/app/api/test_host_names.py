@@ -29,7 +29,7 @@ FOREIGN = [
 
 
 @pytest.mark.parametrize("host", FOREIGN)
-@pytest.mark.parametrize("path", ["/api/health", "/sign-in", "/static/dom.js", "/api/sign-in"])
+@pytest.mark.parametrize("path", ["/api/health", "/sign-in", "/static/shared/dom.js", "/api/sign-in"])
 def test_a_name_that_leads_here_by_somebody_elses_will_is_refused(
     live: LiveServer, host: str, path: str
 ) -> None:

@@ -1,6 +1,6 @@
 /** The keyboard overlay, written from the bindings themselves. */
 
-import { byId, element } from "../dom.js";
+import { byId, element } from "./dom.js";
 import { MOD } from "./keys.js";
 
 const SHOWN = { Mod: MOD, Escape: "Esc" };

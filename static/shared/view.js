@@ -1,6 +1,6 @@
 /** The 3-D view: viser in an iframe of the same origin, with its own panel put away. */
 
-import { byId } from "../dom.js";
+import { byId } from "./dom.js";
 import { finenessQuery } from "./fineness.js";
 
 const HIDE_VISER_PANEL = ".mantine-Paper-root, .mantine-Notifications-root { display: none !important }";

@@ -1,7 +1,7 @@
 /** The object alone, to be turned by a drag and pointed at by a click. */
 
+import { distance, LARGEST_CLICK } from "../click.js";
 import { rgb } from "../dom.js";
-import { distance, LARGEST_CLICK } from "./pointing.js";
 import { product, rotationMatrix } from "./pose.js";
 import { firstHit } from "./ray.js";
 
