@@ -16,9 +16,12 @@ const STATES = {
 const ENDED = new Set(["done", "failed"]);
 
 const message = messageArea(byId("message"));
+/** @type {Rest["DatasetOut"][]} */
 let datasets = [];
+/** @type {number | null} */
 let followed = null;
-let shown = null;
+/** @type {Rest["ExportOut"]} */
+let shown;
 
 byId("dataset").addEventListener("change", showContents);
 byId("export-form").addEventListener("submit", start);
@@ -38,9 +41,9 @@ async function showPage() {
     return;
   }
   byId("format").replaceChildren(...formats.map(({ name, title }) => new Option(title, name)));
-  byId("dataset").replaceChildren(...datasets.map(({ name, id }) => new Option(name, id)));
+  byId("dataset").replaceChildren(...datasets.map(({ name, id }) => new Option(name, String(id))));
   const asked = new URLSearchParams(location.search).get("dataset_id");
-  if (datasets.some(({ id }) => String(id) === asked)) byId("dataset").value = asked;
+  if (asked && datasets.some(({ id }) => String(id) === asked)) byId("dataset").value = asked;
   byId("export-form").hidden = false;
   showContents();
   const jobs = await showEarlier();
@@ -49,14 +52,14 @@ async function showPage() {
 }
 
 function chosen() {
-  return datasets.find(({ id }) => String(id) === byId("dataset").value);
+  return datasets[byId("dataset").selectedIndex];
 }
 
 function showContents() {
   const { id, scenes, objects, tasks, tasks_submitted: submitted, suggestions_open: open } = chosen();
   const figures = { "poses submitted": submitted, "tasks still open": tasks - submitted, scenes, objects };
   byId("undecided").hidden = !open;
-  for (const link of document.querySelectorAll("#objects, #undecided a"))
+  for (const link of [byId("objects"), ...byId("undecided").querySelectorAll("a")])
     link.href = `/objects?dataset_id=${id}`;
   setText(byId("undecided-count"), count(open, "object"));
   byId("contents").replaceChildren(
@@ -143,7 +146,7 @@ async function copyCurl() {
     setText(byId("copy-label"), "Copied");
   } catch {
     // The clipboard is closed to pages served over plain http: select the line instead.
-    getSelection().selectAllChildren(byId("curl"));
+    getSelection()?.selectAllChildren(byId("curl"));
     setText(byId("copy-label"), "Selected: copy it");
   }
 }

@@ -137,7 +137,7 @@ class DatasetOut(BaseModel):
 @router.get("")
 def list_datasets(
     services: ServicesDep, _identity: IdentityDep, after: AfterDep = 0, limit: LimitDep = 100
-) -> Page:
+) -> Page[DatasetOut]:
     """All datasets."""
     with services.database.read() as session:
         return page_of(session, select(Dataset), Dataset.id, after, limit, partial(_out, services, session))

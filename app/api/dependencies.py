@@ -1,7 +1,7 @@
 """What routes ask for: the services, who is asking, and a page of a list."""
 
 from collections.abc import Callable, Sequence
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -29,6 +29,7 @@ EXAMPLE_POSE = [[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0.8], [0, 0, 0, 1]]
 """For the interface's description."""
 
 Row = TypeVar("Row")
+Item = TypeVar("Item")
 
 
 def get_services(connection: HTTPConnection) -> Services:
@@ -89,10 +90,10 @@ LimitDep = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="Most items t
 AfterDep = Annotated[int, Query(ge=0, le=2**31 - 1, description="`next` of the page before.")]
 
 
-class Page(BaseModel):
+class Page(BaseModel, Generic[Item]):
     """Part of a list; `next` is handed in as `after` for the part that follows, null at the end."""
 
-    items: list[Any]
+    items: list[Item]
     next: int | None
 
 
@@ -102,8 +103,8 @@ def page_of(
     key: Any,
     after: int,
     limit: int,
-    to_json: Callable[[Row], Any],
-) -> Page:
+    to_json: Callable[[Row], Item],
+) -> Page[Item]:
     """One page of a query's rows in the order of `key`, an integer column."""
     ordered = query.where(key > after).order_by(key).limit(limit + 1)
     rows: Sequence[Row] = session.scalars(ordered).unique().all()

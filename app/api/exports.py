@@ -124,7 +124,7 @@ def list_exports(
     dataset_id: QueryId = None,
     after: AfterDep = 0,
     limit: LimitDep = 100,
-) -> Page:
+) -> Page[ExportOut]:
     """All exports, or those of one dataset."""
     query = select(Export).options(joinedload(Export.dataset))
     if dataset_id is not None:

@@ -85,7 +85,7 @@ def list_objects(
     suggestions_open: bool | None = None,
     after: AfterDep = 0,
     limit: LimitDep = 100,
-) -> Page:
+) -> Page[ObjectOut]:
     """All objects, or those of one dataset, or those whose suggested symmetries wait for a decision."""
     query = select(Object)
     if suggestions_open is not None:

@@ -177,7 +177,7 @@ def list_events(
     identity: IdentityDep,
     after: AfterDep = 0,
     limit: LimitDep = 100,
-) -> Page:
+) -> Page[EventOut]:
     """The log of a registration: one's own, or anyone's for a reviewer."""
     services.live_sessions.check_readable(registration_id, identity)
     query = select(Event).where(Event.registration_id == registration_id)

@@ -32,7 +32,7 @@ class Shown(BaseModel):
 
 
 @router.get("/{registration_id}/things")
-def list_things(live_session: LiveSessionDep) -> Page:
+def list_things(live_session: LiveSessionDep) -> Page[ThingOut]:
     """What is asked for in the scene, in the order of the tasks; snaps know those with a pose."""
     return Page(items=[_out(thing) for thing in live_session.neighbours.things], next=None)
 

@@ -80,7 +80,7 @@ def list_scenes(
     dataset_id: QueryId = None,
     after: AfterDep = 0,
     limit: LimitDep = 100,
-) -> Page:
+) -> Page[SceneOut]:
     """All scenes, or those of one dataset."""
     query = select(Scene).options(selectinload(Scene.frames))
     if dataset_id is not None:

@@ -147,7 +147,7 @@ def create_study(body: NewStudy, services: ServicesDep, identity: AdminDep) -> S
 @router.get("")
 def list_studies(
     services: ServicesDep, _identity: AdminDep, after: AfterDep = 0, limit: LimitDep = 100
-) -> Page:
+) -> Page[StudyOut]:
     """All studies."""
     with services.database.read() as session:
         return page_of(session, select(Study), Study.id, after, limit, _out)

@@ -144,7 +144,7 @@ def list_tasks(
     wanted: FilterDep,
     after: AfterDep = 0,
     limit: LimitDep = 100,
-) -> Page:
+) -> Page[TaskOut]:
     """All tasks, or those of a dataset, a scene, in a state, a mode, under a condition."""
     query = _ordinary_tasks(wanted)
     with services.database.read() as session:

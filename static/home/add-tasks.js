@@ -12,6 +12,7 @@ export function setUpAddTasks(onAdded) {
   const sceneSelect = byId("add-scene");
   const list = byId("add-objects");
   const message = messageArea(byId("add-message"));
+  /** @type {Rest["ObjectOut"][]} */
   let objects = [];
 
   byId("add-method").append(
@@ -29,7 +30,7 @@ export function setUpAddTasks(onAdded) {
     dialog.showModal();
     await guarded(async () => {
       const datasets = await getAll("/api/datasets");
-      datasetSelect.replaceChildren(...datasets.map(({ name, id }) => new Option(name, id)));
+      datasetSelect.replaceChildren(...datasets.map(({ name, id }) => new Option(name, String(id))));
       if (datasetId) datasetSelect.value = datasetId;
       await showDataset(sceneId);
     });
@@ -39,7 +40,7 @@ export function setUpAddTasks(onAdded) {
     const filter = { dataset_id: datasetSelect.value };
     const [scenes, all] = await Promise.all([getAll("/api/scenes", filter), getAll("/api/objects", filter)]);
     objects = all;
-    sceneSelect.replaceChildren(...scenes.map(({ label, id }) => new Option(label, id)));
+    sceneSelect.replaceChildren(...scenes.map(({ label, id }) => new Option(label, String(id))));
     if (sceneId !== null) sceneSelect.value = sceneId;
     await showScene();
   }
@@ -58,7 +59,9 @@ export function setUpAddTasks(onAdded) {
   }
 
   function chosenIds() {
-    const ticked = new Set([...list.querySelectorAll("input:checked")].map((box) => box.value));
+    const ticked = new Set(
+      [...list.querySelectorAll("input")].filter(({ checked }) => checked).map(({ value }) => value),
+    );
     return objects.map(({ id }) => id).filter((id) => ticked.has(String(id)));
   }
 
@@ -70,7 +73,8 @@ export function setUpAddTasks(onAdded) {
 
   async function addTasks() {
     byId("add-start").disabled = true;
-    const common = { scene_id: numberOrText(sceneSelect.value), method: byId("add-method").value };
+    const method = /** @type {keyof typeof METHODS} */ (byId("add-method").value);
+    const common = { scene_id: Number(sceneSelect.value), method };
     const ids = chosenIds();
     try {
       for (const id of ids) await post("/api/tasks", { ...common, object_id: id });
@@ -98,9 +102,4 @@ function objectChoice({ id, name, diameter }, taken) {
   const box = element("input", { type: "checkbox", value: id });
   const note = taken ? `has ${count(taken, "task")}` : `${Math.round(diameter * 1000)} mm`;
   return element("label", {}, box, element("span", {}, name), element("small", {}, note));
-}
-
-/** Ids are integers or strings; an option's value is always a string. */
-function numberOrText(id) {
-  return /^\d+$/.test(id) ? Number(id) : id;
 }

@@ -24,7 +24,7 @@ export function setUpImport(onImported) {
   });
 
   function showChosen() {
-    const [file] = input.files;
+    const [file] = input.files ?? [];
     const name = file ? `${file.name} · ${fileSize(file.size)}` : "Choose a zip file, or drop it here";
     setText(byId("import-name"), name);
     byId("import-start").disabled = !file;
@@ -33,9 +33,10 @@ export function setUpImport(onImported) {
 
   /** `fields` go with the file, in the place of what the dataset says. */
   function start(fields) {
+    const [file] = input.files ?? [];
     message.clear();
     setBusy(true);
-    upload = sendZip(input.files[0], fields, showProgress, (outcome) => {
+    upload = sendZip(file, fields, showProgress, (outcome) => {
       upload = null;
       setBusy(false);
       if (outcome.dataset) finish(outcome.dataset);

@@ -11,7 +11,9 @@ export function keepPlace(look) {
 
 /** What was kept, if this is the same page again; null for somebody who came by a link. */
 export function keptPlace() {
-  const [{ type }] = performance.getEntriesByType("navigation");
-  const kept = JSON.parse(sessionStorage.getItem(KEPT));
+  const [{ type }] = /** @type {PerformanceNavigationTiming[]} */ (
+    performance.getEntriesByType("navigation")
+  );
+  const kept = JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
   return type !== "navigate" && kept?.address === location.href ? kept : null;
 }

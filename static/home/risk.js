@@ -40,9 +40,9 @@ export function setUpRisk(onSet) {
     setText(byId("risk-title"), `Risk of ${name}`);
     byId("risk-choices").replaceChildren(...choices);
     byId("risk-other").hidden = present !== OTHER;
-    byId("risk-percent").value = Number((100 * risk).toPrecision(4));
+    byId("risk-percent").value = String(Number((100 * risk).toPrecision(4)));
     dialog.showModal();
-    dialog.querySelector("input:checked").focus();
+    ticked()?.focus();
     guarded(show);
   }
 
@@ -80,7 +80,8 @@ export function setUpRisk(onSet) {
   return { open };
 }
 
-const chosen = () => document.querySelector("#risk-choices input:checked").value;
+const ticked = () => [...byId("risk-choices").querySelectorAll("input")].find(({ checked }) => checked);
+const chosen = () => ticked()?.value;
 
 function choice(value, text, checked) {
   const radio = element("input", { type: "radio", name: "risk", value, checked });

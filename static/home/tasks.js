@@ -16,18 +16,21 @@ const KINDS = ["mode", "condition"];
 /** `openAddTasks` is null for those who may not add tasks; `onProblem(error)` shows what went wrong. */
 export function setUpTasks({ me, openAddTasks, onProblem }) {
   const filter = filterIn(location.search);
+  /** @type {Rest["DatasetOut"][]} */
   let datasets = [];
   let next = null;
   let request = 0;
   keepPlace(() => ({ shown: byId("tasks").childElementCount }));
 
-  byId("scene-filter").addEventListener("change", (event) => change("scene_id", event.target.value));
-  byId("state-filter").addEventListener("change", (event) => change("state", event.target.value));
-  for (const kind of KINDS)
-    byId(`${kind}-filter`).addEventListener("change", (event) => change(kind, event.target.value));
+  byId("scene-filter").addEventListener("change", () => change("scene_id", byId("scene-filter").value));
+  for (const kind of KINDS) {
+    const select = byId(`${kind}-filter`);
+    select.addEventListener("change", () => change(kind, select.value));
+  }
   byId("more").addEventListener("click", () => showMore().catch(onProblem));
-  for (const radio of document.querySelectorAll("#state-filter input")) {
+  for (const radio of byId("state-filter").querySelectorAll("input")) {
     radio.checked = radio.value === (filter.state ?? "");
+    radio.addEventListener("change", () => change("state", radio.value));
   }
 
   function change(name, value) {
@@ -77,7 +80,7 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
     const select = byId("scene-filter");
     const datasetId = filter.dataset_id ?? (datasets.length === 1 ? datasets[0].id : null);
     const scenes = datasetId === null ? [] : await getAll("/api/scenes", { dataset_id: datasetId });
-    const options = scenes.map((scene) => new Option(scene.label, scene.id));
+    const options = scenes.map((scene) => new Option(scene.label, String(scene.id)));
     select.replaceChildren(new Option("All scenes", ""), ...options);
     select.value = filter.scene_id ?? "";
     select.disabled = scenes.length === 0;
@@ -110,7 +113,7 @@ export function setUpTasks({ me, openAddTasks, onProblem }) {
         for (const name of CHOICES) filter[name] = null;
         byId("scene-filter").value = "";
         showKinds();
-        document.querySelector("#state-filter input").checked = true;
+        byId("state-filter").querySelectorAll("input")[0].checked = true;
         show().catch(onProblem);
       });
       return [title, element("p", {}, "No task matches what you chose above."), clear];

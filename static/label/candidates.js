@@ -10,10 +10,16 @@ const LEAST_WEIGHT = 0.05; // of a mode that is worth a look
 const MOST_FOUND = 5; // that are worth one
 const SAME = 1e-9; // metres, and entries of a rotation
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function candidatesPart(page) {
   let frames = [];
   let drawing = null; // promised
+  /** @type {any} */
   let source = null; // {kind, id, url, symmetries}
   let cards = [];
   let chosen = -1; // the one that is looked at

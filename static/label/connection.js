@@ -5,7 +5,12 @@ import { focusView } from "../shared/view.js";
 
 const RETRY_MS = 1000;
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function connectionPart(page) {
   let opened = false;
   setInterval(help, RETRY_MS);
@@ -18,7 +23,7 @@ export function connectionPart(page) {
 
   /** The view reconnects only while it has the focus: it gets it, but never from somebody who types. */
   function help() {
-    const isTyping = document.activeElement.matches("input:not([type='range']), dialog *");
+    const isTyping = document.activeElement?.matches("input:not([type='range']), dialog *");
     if (!byId("view-lost").hidden && page.isConnected() && document.hasFocus() && !isTyping) focusView();
   }
 

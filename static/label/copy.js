@@ -4,7 +4,12 @@ import { get } from "../shared/api.js";
 import { byId, element, picture } from "../shared/dom.js";
 import { POSED_BY } from "../shared/posed-by.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function copyPart(page) {
   const button = byId("copy");
   const dialog = byId("copies");
@@ -16,7 +21,8 @@ export function copyPart(page) {
     if (!step) return;
     event.preventDefault();
     const buttons = [...list.querySelectorAll("button")];
-    buttons[buttons.indexOf(document.activeElement) + step]?.focus();
+    const present = /** @type {HTMLButtonElement} */ (document.activeElement);
+    buttons[buttons.indexOf(present) + step]?.focus();
   });
 
   async function show() {

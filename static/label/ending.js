@@ -4,10 +4,16 @@ import { byId, setText } from "../shared/dom.js";
 import { showNext } from "./next.js";
 import { possible } from "./panel.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function endingPart(page) {
   const dialog = byId("skip-dialog");
-  let task = null;
+  /** @type {Rest["TaskOut"]} */
+  let task;
   const reasons = [...dialog.querySelectorAll("[data-reason]")];
 
   byId("skip").addEventListener("click", ask);

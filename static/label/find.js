@@ -4,13 +4,18 @@ import { del, post } from "../shared/api.js";
 import { byId } from "../shared/dom.js";
 import { possible } from "./panel.js";
 
-/** A part of the labelling page; what is found is shown by `candidates.js`. */
+/**
+ * A part of the labelling page; what is found is shown by `candidates.js`.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function findPart(page) {
   let asking = false;
   byId("find").addEventListener("click", find);
   byId("find-cancel").addEventListener("click", leave);
 
-  const isLooking = () => ["queued", "running"].includes(page.registration()?.search?.state);
+  const isLooking = () => ["queued", "running"].includes(page.registration()?.search?.state ?? "");
   const canFind = () => possible(page.registration(), page.isConnected()).find && !asking && !isLooking();
 
   async function find() {
@@ -24,7 +29,7 @@ export function findPart(page) {
   /** True if there was a search to cancel. */
   function leave() {
     if (!isLooking()) return false;
-    del(`/api/searches/${page.registration().search.id}`).catch(page.message.problem);
+    del(`/api/searches/${page.registration().search?.id}`).catch(page.message.problem);
     return true;
   }
 

@@ -8,10 +8,21 @@ const TURNED = 30; // page pixels of a drag beside the object that turn the view
 const CAMERA_KEYS = /^(Key[WASDQE]|Arrow\w+)$/; // viser's own
 
 /**
+ * @typedef {{
+ *   name: string,
+ *   text: string,
+ *   byKeys?: { tool: string, text: string },
+ *   isDone?: (now: Registration, before: Registration) => boolean,
+ *   tool?: string,
+ * }} GuideStep
+ */
+
+/**
  * In order; each can be done by mouse and by keys. `text` has keys in backticks, and `byKeys` follows it where
  * there are those keys; `isDone(now, before)` compares two states of the registration. What the server does not
  * know of, the view and the image, is told by `check(name)` below.
  */
+/** @type {GuideStep[]} */
 const STEPS = [
   {
     name: "move",
@@ -51,7 +62,12 @@ const STEPS = [
 ];
 const END = "That is all you need. `?` shows every key, and this tour again.";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function guidePart(page) {
   const done = new Set();
   let steps = STEPS;
@@ -70,12 +86,13 @@ export function guidePart(page) {
   function open() {
     if (page.isTrial()) return; // there, everybody is told the same
     steps = STEPS.filter(({ tool }) => !tool || page.has(tool));
-    const remembered = JSON.parse(localStorage.getItem(key()));
+    const remembered = JSON.parse(localStorage.getItem(key()) ?? "null");
     for (const name of remembered?.done ?? []) done.add(name);
     if (remembered ? remembered.isOn : page.me().submitted === 0) start();
   }
 
-  const textOf = ({ text, byKeys }) => text + (byKeys && page.has(byKeys.tool) ? byKeys.text : "");
+  const textOf = (/** @type {GuideStep} */ { text, byKeys }) =>
+    text + (byKeys && page.has(byKeys.tool) ? byKeys.text : "");
   const key = () => `snap6d.guide.${page.me().id}`;
   const remember = () => localStorage.setItem(key(), JSON.stringify({ isOn, done: [...done] }));
 

@@ -48,31 +48,38 @@ const BEHIND_NOTICE = ".stage > :not(#closed), #strip, .side, #help";
 const taskId = location.pathname.split("/").filter(Boolean).at(-1);
 const message = messageArea(byId("message"));
 const pending = new Set();
-let me = null;
-let task = null;
+/** @type {Rest["Me"]} */
+let me;
+/** @type {Rest["TaskOut"]} */
+let task;
+/** @type {Registration | null} */
 let registration = null;
+/** @type {Set<string>} */
 let tools = new Set();
+/** @type {Promise<Rest["SnapId"]> | null} */
 let snapRequest = null;
 let steps = Promise.resolve(); // undo and redo under way, one after the other
 let stepsLeft = 0;
 let connected = true;
 
+/** @type {LabelPage} */
 const page = {
   message,
   path,
   me: () => me,
   isTrial: () => me?.role === "participant",
   has: (tool) => tools.has(tool),
-  registration: () => registration,
+  registration: () => /** @type {Registration} */ (registration),
   isConnected: () => connected,
-  put: (action, body) => change(put(path(action), body)),
-  post: (action, body) => change(post(path(action), body)),
+  put: (action, body) => change(put(/** @type {any} */ (path(action)), body)),
+  post: (action, body) => change(post(/** @type {any} */ (path(action)), body)),
   canMove: () => connected && registration?.state === "open" && !registration.dragging,
   act,
   showFrame: (frame) => page.put("frame", { frame_id: frame.id }),
   leaveMode,
 };
 const submission = submissionPart(page);
+/** @type {Part[]} */
 const PARTS = [
   submission,
   endingPart(page),
@@ -102,7 +109,7 @@ const PARTS = [
 
 const ACTIONS = {
   snap: requestSnap,
-  cancel: async () => del(`/api/snaps/${registration.snap.id ?? (await snapRequest).id}`),
+  cancel: async () => del(`/api/snaps/${page.registration().snap?.id ?? (await snapRequest)?.id}`),
   undo: () => page.post("undo"),
   redo: () => page.post("redo"),
   reset: () => page.post("reset"),
@@ -211,19 +218,19 @@ async function change(request) {
 }
 
 /** Draws a state of the registration, the only place where it changes; one that was overtaken is left out. */
-function show(received) {
+function show(/** @type {Registration} */ received) {
   const before = registration;
   if (before && received.revision < before.revision) return;
   registration = received;
-  drawPanel(registration, connected);
-  for (const part of PARTS) part.draw?.(registration, before);
-  reportSnap(before?.snap, registration.snap);
-  const { message: problem, symmetries_version: version } = registration;
+  drawPanel(received, connected);
+  for (const part of PARTS) part.draw?.(received, before);
+  reportSnap(before?.snap, received.snap);
+  const { message: problem, symmetries_version: version } = received;
   if (before && version !== before.symmetries_version && !page.isTrial()) {
     message.show("The object's symmetries were changed: the next snap goes by the new ones.");
   }
   if (problem && problem !== before?.message) message.show(problem, "problem");
-  if (before && registration.state !== before.state && !page.isTrial())
+  if (before && received.state !== before.state && !page.isTrial())
     showDatasetProgress().catch(message.problem);
 }
 
@@ -262,17 +269,16 @@ async function perform(name) {
 
 /** Shows the snap as queued at once, so that it can be cancelled before the server has answered. */
 async function requestSnap() {
-  const before = registration.snap;
+  const { method, snap: before } = page.registration();
   snapRequest = post(path("snaps"), {});
-  const { method } = registration;
   show({
-    ...registration,
+    ...page.registration(),
     snap: { id: null, asked_by: "human", state: "queued", progress: 0, message: null, method, frames: null },
   });
   try {
     await snapRequest;
   } catch (error) {
-    show({ ...registration, snap: before });
+    show({ ...page.registration(), snap: before });
     throw error;
   }
 }
@@ -337,6 +343,13 @@ function showClosed(title, text, retry) {
   byId("closed-retry").focus();
 }
 
+/**
+ * The address of something about the registration.
+ *
+ * @template {string} Action
+ * @param {Action} action
+ * @returns {ActionPath<Action>}
+ */
 function path(action) {
-  return `/api/registrations/${registration.id}/${action}`;
+  return `/api/registrations/${page.registration().id}/${action}`;
 }

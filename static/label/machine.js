@@ -9,7 +9,12 @@ import { possible } from "./panel.js";
 
 const REMEMBERED = "snap6d.live";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function machinePart(page) {
   let switching = false;
   byId("live").addEventListener("click", toggle);

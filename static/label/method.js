@@ -3,7 +3,12 @@
 import { byId } from "../shared/dom.js";
 import { METHODS } from "../shared/format.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function methodPart(page) {
   const choice = byId("method");
   choice.addEventListener("change", choose);
@@ -11,7 +16,7 @@ export function methodPart(page) {
   async function choose() {
     choice.blur(); // so that Space snaps
     try {
-      await page.put("method", { method: choice.value });
+      await page.put("method", { method: /** @type {Registration["method"]} */ (choice.value) });
     } catch (error) {
       choice.value = page.registration().method;
       page.message.problem(error);

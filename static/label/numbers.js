@@ -2,9 +2,14 @@
 
 import { poseNumbers, product, withNumber } from "../shared/drawing/pose.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function numbersPart(page) {
-  const fields = [...document.querySelectorAll("[data-pose]")];
+  const fields = /** @type {HTMLInputElement[]} */ ([...document.querySelectorAll("[data-pose]")]);
   let frames = [];
   let shown = {};
   for (const field of fields) {
@@ -39,12 +44,9 @@ export function numbersPart(page) {
     if (!isNew || !page.canMove()) return;
     const { frame_id: frameId, T_camera_object: T } = page.registration();
     const { T_world_camera } = frames.find((frame) => frame.id === frameId);
-    const body = {
-      T_world_object: product(T_world_camera, withNumber(T, name, value)),
-      technique: "numbers",
-    };
+    const T_world_object = product(T_world_camera, withNumber(T, name, value));
     page.message.clear();
-    await page.put("pose", body).catch(page.message.problem);
+    await page.put("pose", { T_world_object, technique: "numbers" }).catch(page.message.problem);
   }
 
   return { open: (_task, scene) => (frames = scene.frames), draw };

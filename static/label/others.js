@@ -2,7 +2,11 @@
 
 import { byId, setText } from "../shared/dom.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @returns {Part}
+ */
 export function othersPart() {
   function draw({ others }) {
     const [first, ...rest] = others;

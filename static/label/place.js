@@ -3,7 +3,12 @@
 import { byId } from "../shared/dom.js";
 import { scenePointing } from "./pointing.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function placePart(page) {
   const button = byId("place");
   const pointing = scenePointing(page, place, (point) => canPlace() && place(point));

@@ -9,10 +9,14 @@ const CROSSHAIR = ".placing canvas { cursor: crosshair !important }";
  * A mode in which clicks point at the scene. `onPoint` gets {across, down} as shares of the 3-D view, or the
  * {frame_id, column, row} of a pixel; so does `onDouble`, by a double click while no such mode is on. Returns
  * `use(on)`, and `attach(window)` for each document of the 3-D view.
+ *
+ * @param {LabelPage} page
+ * @param {(pointed: Rest["ViewPoint"] | Rest["PixelPoint"]) => unknown} onPoint
+ * @param {(pointed: Rest["ViewPoint"] | Rest["PixelPoint"]) => unknown} [onDouble]
  */
-export function scenePointing(page, onPoint, onDouble = () => {}) {
+export function scenePointing(page, onPoint, onDouble = (_pointed) => {}) {
   const image = byId("color");
-  const box = image.closest(".image-frame");
+  const box = /** @type {HTMLElement} */ (image.closest(".image-frame"));
   const roots = new Set([document.documentElement]);
   let on = false;
   let pressedAt = null;

@@ -19,10 +19,16 @@ const LEGEND = {
 };
 const STORED = "snap6d.precision";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function precisionPart(page) {
   const section = byId("precision");
-  const buttons = (name) => [...document.querySelectorAll(`[data-${name}]`)];
+  /** @returns {HTMLButtonElement[]} */
+  const buttons = (name) => [.../** @type {NodeListOf<any>} */ (document.querySelectorAll(`[data-${name}]`))];
   const waiting = [];
   let sending = false;
   let { step, axes, open } = {
@@ -37,13 +43,14 @@ export function precisionPart(page) {
     open = section.open;
     remember();
   });
-  for (const button of buttons("step")) button.addEventListener("click", () => useStep(+button.dataset.step));
+  for (const button of buttons("step"))
+    button.addEventListener("click", () => useStep(Number(button.dataset.step)));
   for (const button of buttons("axes")) button.addEventListener("click", () => useAxes(button.dataset.axes));
   for (const button of buttons("gizmo"))
     button.addEventListener("click", () => useGizmo(button.dataset.gizmo));
   for (const button of buttons("turn")) {
     const { turn, about } = button.dataset;
-    button.addEventListener("click", () => rotate(ALONG[about], +turn));
+    button.addEventListener("click", () => rotate(ALONG[about ?? ""], Number(turn)));
   }
   byId("rest").addEventListener("click", rest);
   show();
@@ -65,7 +72,7 @@ export function precisionPart(page) {
   }
 
   function show() {
-    press(buttons("step"), (button) => +button.dataset.step === step);
+    press(buttons("step"), (button) => Number(button.dataset.step) === step);
     press(buttons("axes"), (button) => button.dataset.axes === axes);
     setText(byId("nudge-legend"), LEGEND[axes] ?? LEGEND.object);
   }

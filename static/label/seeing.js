@@ -5,7 +5,12 @@ import { drawsFinely, rememberedLayers, rememberLayers } from "../shared/finenes
 
 const AT_FIRST = { cloud: true, mesh: true, texture: true, fine: true, agreement: false };
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function seeingPart(page) {
   const buttons = [...document.querySelectorAll("[data-layer]")];
   let asked = null; // the layers that the server is on the way to be told
@@ -17,8 +22,8 @@ export function seeingPart(page) {
 
   function draw({ agreement, layers, has_texture: hasTexture }, before) {
     drawAgreement(agreement);
-    document.querySelector("[data-layer=texture]").hidden = !hasTexture;
-    for (const button of buttons) button.setAttribute("aria-pressed", layers[button.dataset.layer]);
+    for (const button of buttons) if (button.dataset.layer === "texture") button.hidden = !hasTexture;
+    for (const button of buttons) button.setAttribute("aria-pressed", layers[button.dataset.layer ?? ""]);
     byId("verdicts").hidden = !layers.agreement;
     const fresh = !before || (isSame(layers, AT_FIRST) && !isSame(before.layers, AT_FIRST)); // page or server came up
     if (fresh && !isSame(layers, wanted())) change(wanted());
@@ -78,6 +83,7 @@ function drawAgreement(agreement) {
   setText(byId("agreement-residual"), residual === null ? "" : `· ${(1000 * residual).toFixed(1)} mm`);
   for (const row of document.querySelectorAll("[data-verdict]")) {
     const { verdict } = row.dataset;
-    setText(row.querySelector("output"), agreement ? percent(agreement[verdict]) : "–");
+    const text = agreement && verdict ? percent(agreement[verdict]) : "–";
+    for (const output of row.querySelectorAll("output")) setText(output, text);
   }
 }

@@ -4,7 +4,12 @@ import { byId } from "../shared/dom.js";
 
 const REMEMBERED = "snap6d.snap-frames";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function snapFramesPart(page) {
   const button = byId("this-frame-only");
   let isChanging = false;

@@ -6,7 +6,12 @@ import { possible } from "./panel.js";
 
 const LEAST_AGREEMENT = 0.5; // a pose that is 4 mm and 4° off has about 0.7, one of 8 mm and 8° less than this
 
-/** A part of the labelling page; `submit` submits or asks. */
+/**
+ * A part of the labelling page; `submit` submits or asks.
+ *
+ * @param {LabelPage} page
+ * @returns {Part & { submit: () => Promise<void> }}
+ */
 export function submissionPart(page) {
   let askedAbout = null; // the pose, as text
   // The second click of a double click on the button that was here is no answer.

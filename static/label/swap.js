@@ -2,9 +2,13 @@
 
 import { byId, setText } from "../shared/dom.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @returns {Part}
+ */
 export function swapPart() {
-  const main = document.querySelector("main");
+  const main = document.querySelectorAll("main")[0];
   byId("swap").addEventListener("click", swap);
 
   function swap() {

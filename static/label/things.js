@@ -6,7 +6,12 @@ import { byId, element, icon, setText } from "../shared/dom.js";
 const HIDDEN = "snap6d.things.hidden";
 const OPENED = "snap6d.things.open";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function thingsPart(page) {
   const box = byId("things");
   const button = byId("hide-things");

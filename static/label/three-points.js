@@ -10,7 +10,12 @@ import { placeOfPixel, scenePointing } from "./pointing.js";
 
 const LEAST = 3;
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function threePointsPart(page) {
   const button = byId("three-points");
   const pointing = scenePointing(page, pickInScene);
@@ -158,7 +163,7 @@ export function threePointsPart(page) {
     const residual = fit?.residuals[index];
     const out = element("button", { type: "button", className: "button quiet square" }, icon("close"));
     out.setAttribute("aria-label", `Take pair ${index + 1} out`);
-    out.title = out.getAttribute("aria-label");
+    out.title = out.ariaLabel ?? "";
     out.addEventListener("click", () => takeOut(index));
     const number = element("span", { className: "pair-number" }, `${index + 1}`);
     const off = element(

@@ -8,7 +8,12 @@ import { byId, setText } from "../shared/dom.js";
 
 const SECOND_MS = 1000;
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function trialPart(page) {
   let clockKey = null; // under which the time used is kept
   let viewIsThere = false;
@@ -39,7 +44,7 @@ export function trialPart(page) {
     showClock();
     setInterval(() => {
       if (page.registration()?.state !== "open") return;
-      localStorage.setItem(clockKey, used() + 1);
+      localStorage.setItem(clockKey, String(used() + 1));
       showClock();
     }, SECOND_MS);
   }

@@ -6,7 +6,12 @@ import { byId, element, setText } from "../shared/dom.js";
 const DEGREES = 180 / Math.PI;
 const REMEMBERED = "snap6d.uncertainty";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function uncertaintyPart(page) {
   const isShown = () => localStorage.getItem(REMEMBERED) !== "hidden";
   let viewIsThere = false;

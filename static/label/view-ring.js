@@ -5,7 +5,11 @@
 
 import { byId } from "../shared/dom.js";
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @returns {Part}
+ */
 export function viewRingPart() {
   let byKey = false;
   follow(window);
@@ -24,7 +28,7 @@ export function viewRingPart() {
 
   function show() {
     const view = byId("view");
-    view?.parentElement.classList.toggle("ringed", byKey && document.activeElement === view);
+    view?.parentElement?.classList.toggle("ringed", byKey && document.activeElement === view);
   }
 
   return { attach: follow };

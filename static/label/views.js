@@ -3,9 +3,14 @@
 import { post } from "../shared/api.js";
 import { byId } from "../shared/dom.js";
 
-/** A part of the labelling page; the view's element is told by the event `looked`. */
+/**
+ * A part of the labelling page; the view's element is told by the event `looked`.
+ *
+ * @param {LabelPage} page
+ * @returns {Part}
+ */
 export function viewsPart(page) {
-  const buttons = [...document.querySelectorAll("[data-look]")];
+  const buttons = /** @type {HTMLButtonElement[]} */ ([...document.querySelectorAll("[data-look]")]);
   let asked = false;
   for (const button of buttons) button.addEventListener("click", () => look(button.dataset.look));
 

@@ -26,7 +26,11 @@ export function snappingText({ method }) {
   return method === "paper" ? "The paper’s filter runs…" : "Snapping…";
 }
 
-/** A part of the labelling page. */
+/**
+ * A part of the labelling page.
+ *
+ * @returns {Part}
+ */
 export function waitingPart() {
   let followed = null;
   let timer = null;
@@ -46,7 +50,7 @@ export function waitingPart() {
     const snap = await get(`/api/snaps/${id}`).catch(() => null);
     if (id !== followed) return;
     if (snap?.standing) {
-      tell(id, textFor({ ...snap, method }), `${Math.round(snap.standing.seconds)} s`);
+      tell(id, textFor(snap.state, method, snap.standing), `${Math.round(snap.standing.seconds)} s`);
       setText(byId("snap-status"), told.text);
     }
     timer = setTimeout(ask, ASK_AGAIN_MS, id, method);
@@ -61,7 +65,12 @@ function tell(id, text, seconds) {
   setText(byId("snap-seconds"), seconds);
 }
 
-function textFor({ state, method, standing: { workers, ahead, seconds, preparing } }) {
+/**
+ * @param {string} state
+ * @param {Registration["method"]} method
+ * @param {Rest["StandingOut"]} standing
+ */
+function textFor(state, method, { workers, ahead, seconds, preparing }) {
   if (state === "running") return seconds < LONG_SECONDS[method] ? snappingText({ method }) : SLOW;
   if (workers === 0) return NO_WORKER;
   if (preparing) return PREPARING;

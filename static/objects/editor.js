@@ -25,7 +25,8 @@ export function axisEditor({ item, save, onChange, play, onProblem }) {
   let points = null; // picked so far; null: none are asked for
 
   byId("fold").append(new Option(foldText(null), ""));
-  for (let fold = 2; fold <= HIGHEST_FOLD; fold++) byId("fold").append(new Option(foldText(fold), fold));
+  for (let fold = 2; fold <= HIGHEST_FOLD; fold++)
+    byId("fold").append(new Option(foldText(fold), String(fold)));
   form.addEventListener("submit", submit);
   form.addEventListener("input", numbersChanged);
   byId("cancel").addEventListener("click", close);

@@ -265,7 +265,7 @@ function play(button, axis) {
 
 function showTurned(degrees) {
   byId("stop").hidden = degrees === null;
-  document.querySelector(".stage").classList.toggle("playing", degrees !== null);
+  document.querySelector(".stage")?.classList.toggle("playing", degrees !== null);
   const text = degrees === null ? "" : `turned by ${degrees.toFixed(0)}° · the line is its outline at rest`;
   setText(byId("caption"), text);
 }

@@ -18,11 +18,12 @@ const DEGREES = 180 / Math.PI;
  * degrees while a turn is played, null when it ends. Null where the browser has no WebGL 2.
  */
 export function stageOf({ canvas, rest, axes }, drawing, { size, centre }, { onPoint, onTurned, onGrasp }) {
-  const view = objectView(canvas, drawing, {
+  const drawn = objectView(canvas, drawing, {
     onPoint: (point) => playing || onPoint(point),
     onTurn: drawAround,
   });
-  if (view === null) return null;
+  if (drawn === null) return null;
+  const view = drawn;
   let shown = []; // axes of symmetry: {axis, point, label, kind}
   let points = [];
   let playing = null; // {axis, since}
@@ -135,7 +136,11 @@ function seenFrom(eye) {
   return [right, cross(forward, right), forward];
 }
 
-const cross = ([a, b, c], [d, e, f]) => [b * f - c * e, c * d - a * f, a * e - b * d];
+const cross = (/** @type {Vector} */ [a, b, c], /** @type {Vector} */ [d, e, f]) => [
+  b * f - c * e,
+  c * d - a * f,
+  a * e - b * d,
+];
 
 /** How far a fold has turned after so many seconds: turn by turn, with rests. */
 function angleAt(seconds, fold) {

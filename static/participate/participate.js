@@ -159,7 +159,8 @@ function questionField({ text, choices, optional }) {
 }
 
 function sendAnswers() {
-  return post("/api/participation/answers", { answers: Object.fromEntries(new FormData(byId("questions"))) });
+  const answers = /** @type {Record<string, string>} */ (Object.fromEntries(new FormData(byId("questions"))));
+  return post("/api/participation/answers", { answers });
 }
 
 async function send(event, request) {

@@ -12,10 +12,12 @@ export function curvePaths(curve, at, height) {
   );
 }
 
-/** [["10", y], ...]: the powers of ten within the scale. */
+/** [{value: "10", y}, ...]: the powers of ten within the scale. */
 export function curveTicks(curve, height) {
   const y = scale(curve, height);
-  return [1, 10, 100, 1000].filter((value) => value < most(curve)).map((value) => [String(value), y(value)]);
+  return [1, 10, 100, 1000]
+    .filter((value) => value < most(curve))
+    .map((value) => ({ value: String(value), y: y(value) }));
 }
 
 const bothInPeople = ({ translation, rotation }) => [

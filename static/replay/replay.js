@@ -19,7 +19,8 @@ import { presenter } from "./presenter.js";
 import { drawTimeLine } from "./timeline.js";
 
 const DEGREES = 180 / Math.PI;
-const url = `/api/registrations/${location.pathname.split("/").filter(Boolean).at(-1)}`;
+const id = Number(location.pathname.split("/").filter(Boolean).at(-1));
+const url = /** @type {const} */ (`/api/registrations/${id}`);
 const message = messageArea(byId("message"));
 let chosenFrame = null; // by the reviewer; null shows the operator's
 
@@ -111,11 +112,11 @@ function setUpControls(trace, events, viewUrl) {
   byId("play").addEventListener("click", clock.toggle);
   byId("event-previous").addEventListener("click", goBack);
   byId("event-next").addEventListener("click", goOn);
-  byId("speed").addEventListener("change", ({ target }) => clock.setSpeed(Number(target.value)));
-  byId("skip-idle").addEventListener("change", ({ target }) => clock.setSkipsIdle(target.checked));
-  byId("follow").addEventListener("change", ({ target }) => follow(target.checked));
+  byId("speed").addEventListener("change", () => clock.setSpeed(Number(byId("speed").value)));
+  byId("skip-idle").addEventListener("change", () => clock.setSkipsIdle(byId("skip-idle").checked));
+  byId("follow").addEventListener("change", () => follow(byId("follow").checked));
   byId("scrub").max = trace.seconds;
-  byId("scrub").addEventListener("input", ({ target }) => clock.put(target.valueAsNumber));
+  byId("scrub").addEventListener("input", () => clock.put(byId("scrub").valueAsNumber));
 
   openView(viewUrl, (viewWindow) => {
     attachKeys(viewWindow);

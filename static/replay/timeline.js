@@ -22,7 +22,7 @@ export function drawTimeLine(trace, onTime) {
     lanes.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
     lanes.replaceChildren(
       ...trace.idle.flatMap((stretch) => idleStretch(at(stretch.start), at(stretch.end), stretch)),
-      ...curveTicks(trace.curve, CURVE_HEIGHT).flatMap(([value, y]) => [
+      ...curveTicks(trace.curve, CURVE_HEIGHT).flatMap(({ value, y }) => [
         svg("path", { class: "grid", d: `M0 ${y}H${width}` }),
         svg("text", { class: "tick", x: 2, y: y - 2 }, value),
       ]),

@@ -25,7 +25,7 @@ export function setUpChoices(fields, onChange) {
   form.replaceChildren(...selects);
 
   const tell = () => {
-    const values = Object.fromEntries(new FormData(form));
+    const values = /** @type {Record<string, string>} */ (Object.fromEntries(new FormData(form)));
     const given = Object.entries(values).filter(([, value]) => value !== "");
     history.replaceState(null, "", `${location.pathname}?${new URLSearchParams(given)}`);
     return onChange(values);

@@ -11,7 +11,7 @@ import { remarksSection, section, tableOf, withCaution } from "./tables.js";
 const NAMES = { human: "human", default: "STG", paper: "STG, paper’s filter" };
 
 export async function showStudy(studyId, message) {
-  const url = `/api/reports/${studyId}`;
+  const url = /** @type {const} */ (`/api/reports/${studyId}`);
   let newest = 0;
 
   async function show({ error, condition, ...asked }) {
@@ -76,7 +76,9 @@ function draw(report, url, asked, errors) {
   setText(byId("about"), [count(report.trials, "trial"), ...groups].join(" · "));
   drawPanels(report.cells, NAMES, which);
   byId("sections").replaceChildren(
-    ...[rotation, handOffs, fitts, comparisons, truths].map((part) => part(report)).filter(Boolean),
+    ...[rotation, handOffs, fitts, comparisons, truths]
+      .map((part) => part(report))
+      .filter((one) => one !== null),
     remarksSection(report.remarks),
     method(report),
     downloads(report, url, asked),

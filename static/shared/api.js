@@ -1,10 +1,15 @@
 /** The server's REST interface: JSON in and out, problems as errors, sign-in when the login has ended. */
 
 const UNAUTHORIZED = 401;
+/** @type {() => Promise<unknown>} */
 let signInAgain = goToSignIn;
 
 /** A call that did not succeed; `message` is one sentence for people. `status` is 0 without an answer. */
 export class ApiError extends Error {
+  /**
+   * @param {number} status
+   * @param {string} message
+   */
   constructor(status, message) {
     super(message);
     this.name = "ApiError";
@@ -14,24 +19,65 @@ export class ApiError extends Error {
 
 export const UNREACHABLE = "The server cannot be reached. Nothing is lost; try again in a moment.";
 
+/**
+ * @template {string} Path
+ * @param {Known<"get", Path>} path
+ * @param {Query<Path>} [params]
+ * @returns {Promise<Answer<"get", Path>>}
+ */
 export const get = (path, params) => request("GET", withQuery(path, params));
+
+/**
+ * @template {string} Path
+ * @param {Known<"post", Path>} path
+ * @param {Sent<"post", Path>} [body]
+ * @returns {Promise<Answer<"post", Path>>}
+ */
 export const post = (path, body) => request("POST", path, body);
+
+/**
+ * @template {string} Path
+ * @param {Known<"put", Path>} path
+ * @param {Sent<"put", Path>} [body]
+ * @returns {Promise<Answer<"put", Path>>}
+ */
 export const put = (path, body) => request("PUT", path, body);
+
+/**
+ * @template {string} Path
+ * @param {Known<"delete", Path>} path
+ */
 export const del = (path) => request("DELETE", path);
 
-/** All items of a paged list. */
-export async function getAll(path, params = {}) {
+/** REST's description of itself, the one thing that it does not describe. */
+export const getDescription = () => request("GET", "/api/openapi.json");
+
+/**
+ * All items of a paged list.
+ *
+ * @template {string} Path
+ * @param {Known<"get", Path>} path
+ * @param {Omit<Query<Path>, "limit" | "after">} [params]
+ * @returns {Promise<Answer<"get", Path> extends { items: (infer Item)[] } ? Item[] : never>}
+ */
+export async function getAll(path, params) {
+  /** @type {any} */
   const items = [];
   let after = null;
   do {
-    const page = await get(path, { ...params, limit: 200, after });
+    /** @type {any} */
+    const page = await request("GET", withQuery(path, { ...params, limit: 200, after }));
     items.push(...page.items);
     after = page.next;
   } while (after !== null && after !== undefined);
   return items;
 }
 
-/** The next task for me among those of a filter, or null when there is none. */
+/**
+ * The next task for me among those of a filter, or null when there is none.
+ *
+ * @param {Query<"/api/tasks/next">} filter
+ */
 export async function nextTask(filter) {
   try {
     return await get("/api/tasks/next", filter);
@@ -41,7 +87,11 @@ export async function nextTask(filter) {
   }
 }
 
-/** Who is signed in, or null; nobody is asked to sign in for this. */
+/**
+ * Who is signed in, or null; nobody is asked to sign in for this.
+ *
+ * @returns {Promise<Rest["Me"] | null>}
+ */
 export async function whoIsSignedIn() {
   try {
     return await requestOnce("GET", "/api/me");
@@ -51,7 +101,13 @@ export async function whoIsSignedIn() {
   }
 }
 
-/** The sentence to show for a failed answer with the given body text. */
+/**
+ * The sentence to show for a failed answer with the given body text.
+ *
+ * @param {number} status
+ * @param {string} text
+ * @returns {string}
+ */
 export function problemSentence(status, text) {
   try {
     const { detail, title } = JSON.parse(text);
@@ -66,6 +122,8 @@ export function problemSentence(status, text) {
 /**
  * Lets `ask` sign somebody in where the login has ended, in place of the sign-in page. What was asked of the
  * server meanwhile is asked again once the promise of `ask` is fulfilled.
+ *
+ * @param {() => Promise<unknown>} ask
  */
 export function onSignedOut(ask) {
   signInAgain = ask;
@@ -77,12 +135,22 @@ export function goToSignIn() {
   return new Promise(() => {});
 }
 
+/**
+ * @param {string} path
+ * @param {Record<string, any>} [params]
+ */
 function withQuery(path, params = {}) {
-  const isGiven = (value) => value !== null && value !== undefined && value !== "";
+  const isGiven = (/** @type {unknown} */ value) => value !== null && value !== undefined && value !== "";
   const given = Object.entries(params).filter(([, value]) => isGiven(value));
   return given.length ? `${path}?${new URLSearchParams(given)}` : path;
 }
 
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {unknown} [body]
+ * @returns {Promise<any>}
+ */
 async function request(method, path, body) {
   try {
     return await requestOnce(method, path, body);
@@ -93,7 +161,13 @@ async function request(method, path, body) {
   }
 }
 
+/**
+ * @param {string} method
+ * @param {string} path
+ * @param {unknown} [body]
+ */
 async function requestOnce(method, path, body) {
+  /** @type {RequestInit & { headers: Record<string, string> }} */
   const options = { method, headers: { Accept: "application/json" } };
   if (body !== undefined) {
     options.headers["Content-Type"] = "application/json";

@@ -4,7 +4,12 @@ import { element, icon } from "./dom.js";
 
 const ICONS = { accept: "check", look: "look", doubt: "alert" };
 
-/** Shows an assessment in a node, which is hidden where there is none. */
+/**
+ * Shows an assessment in a node, which is hidden where there is none.
+ *
+ * @param {HTMLElement} node
+ * @param {Rest["AssessmentOut"] | null} assessment
+ */
 export function drawAssessment(node, assessment) {
   const text = assessment ? sentenceOf(assessment) : "";
   node.hidden = text === "";
@@ -20,7 +25,11 @@ export function drawAssessment(node, assessment) {
   );
 }
 
-/** The verdict in short, with its reasons to be read on it. */
+/**
+ * The verdict in short, with its reasons to be read on it.
+ *
+ * @param {Rest["AssessmentOut"]} assessment
+ */
 export function verdictMark(assessment) {
   const { verdict } = assessment;
   return element(
@@ -32,6 +41,6 @@ export function verdictMark(assessment) {
   );
 }
 
-function sentenceOf({ verdict, reasons }) {
+function sentenceOf(/** @type {Rest["AssessmentOut"]} */ { verdict, reasons }) {
   return `${verdict}: ${reasons.join("; ")}`;
 }

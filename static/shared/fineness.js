@@ -6,7 +6,7 @@ const COARSE_RATIO = 0.5; // of the view's pixels to those of the screen, along 
 
 /** What the user chose to see in the view, {name: whether}; what was never chosen is not in it. */
 export function rememberedLayers() {
-  return JSON.parse(localStorage.getItem(REMEMBERED)) ?? {};
+  return JSON.parse(localStorage.getItem(REMEMBERED) ?? "{}");
 }
 
 /** Keeps what the user chose, for this browser. */
@@ -27,7 +27,7 @@ export function finenessQuery() {
 function rendersInSoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
   const info = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  const name = gl && info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
   gl?.getExtension("WEBGL_lose_context")?.loseContext();
   return SOFTWARE.test(name);
 }

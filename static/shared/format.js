@@ -6,17 +6,22 @@ export const METHODS = {
   paper: { choice: "Paper’s filter (5–10 s)", name: "paper’s filter" },
 };
 
-/** "1 scene", "3 scenes". */
+/**
+ * "1 scene", "3 scenes".
+ *
+ * @param {number} number
+ * @param {string} noun
+ */
 export function count(number, noun) {
   return `${number.toLocaleString("en")} ${noun}${number === 1 ? "" : "s"}`;
 }
 
-/** "5 %", "0.5 %" of a share. */
+/** "5 %", "0.5 %" of a share. @param {number} share */
 export function percent(share) {
   return `${Number((100 * share).toPrecision(3))} %`;
 }
 
-/** "12 kB", "8.4 MB", "312 MB". */
+/** "12 kB", "8.4 MB", "312 MB". @param {number} bytes */
 export function fileSize(bytes) {
   if (bytes < 1e6) return `${Math.ceil(bytes / 1e3)} kB`;
   return `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;

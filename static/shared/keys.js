@@ -8,8 +8,12 @@ export const MOD = /Mac|iPhone|iPad/.test(navigator.platform) ? "⌘" : "Ctrl";
  * whether it repeats because it is held down. A binding works where `isHere(binding)`.
  *
  * "Mod" is Ctrl or Cmd. viser takes W A S D Q E and the arrows for its camera, so no binding may.
+ *
+ * @param {Binding[]} bindings
+ * @param {(binding: Binding) => boolean} [isHere]
+ * @returns {(target: Window) => void}
  */
-export function keyBindings(bindings, isHere = () => true) {
+export function keyBindings(bindings, isHere = (_binding) => true) {
   const byChord = new Map(bindings.flatMap((binding) => binding.keys.map((key) => [key, binding])));
 
   function onKeyDown(event) {
@@ -25,7 +29,11 @@ export function keyBindings(bindings, isHere = () => true) {
   return (target) => target.addEventListener("keydown", onKeyDown, { capture: true });
 }
 
-/** "Mod+Shift+Z", "Space", "?": Shift is named only where it does not already change the character. */
+/**
+ * "Mod+Shift+Z", "Space", "?": Shift is named only where it does not already change the character.
+ *
+ * @param {Pick<KeyboardEvent, "key" | "code" | "ctrlKey" | "metaKey" | "altKey" | "shiftKey">} event
+ */
 export function chord(event) {
   const key = keyName(event);
   const letterOrNamed = /^[A-Z]$|^..+$/.test(key);

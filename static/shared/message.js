@@ -4,7 +4,12 @@ import { element, icon } from "./dom.js";
 
 const ICONS = { problem: "alert", good: "check", info: "info" };
 
-/** Turns `container` (an empty element with a live-region role) into a message area. */
+/**
+ * Turns `container` (an empty element with a live-region role) into a message area.
+ *
+ * @param {HTMLElement} container
+ * @returns {Message}
+ */
 export function messageArea(container) {
   const clear = () => {
     container.hidden = true;
@@ -13,7 +18,7 @@ export function messageArea(container) {
   container.classList.add("message");
   clear();
 
-  /** Shows `text`; `kind` is "info", "good" or "problem"; `action` is {label, run} or null. */
+  /** @type {Message["show"]} */
   const show = (text, kind = "info", action = null) => {
     const close = element("button", { type: "button", className: "button quiet square" }, icon("close"));
     close.setAttribute("aria-label", "Close message");

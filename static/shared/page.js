@@ -14,6 +14,10 @@ const PAGES = [
 /**
  * Fills the header, then lets `show({id, name, role})` show the page, and returns what that returns. Until then the
  * page says that it loads; where it cannot, the message area says why.
+ *
+ * @template Shown
+ * @param {Message} message
+ * @param {(me: Rest["Me"]) => Promise<Shown>} show
  */
 export async function openPage(message, show) {
   try {
@@ -24,11 +28,11 @@ export async function openPage(message, show) {
     message.problem(error, { label: "Try again", run: () => location.reload() });
     return null;
   } finally {
-    document.querySelector("main").removeAttribute("aria-busy");
+    document.querySelector("main")?.removeAttribute("aria-busy");
   }
 }
 
-function showHeader({ name, role }) {
+function showHeader(/** @type {Rest["Me"]} */ { name, role }) {
   byId("pages").replaceChildren(...PAGES.filter(({ roles }) => roles.includes(role)).map(pageLink));
   const who = element(
     "span",
@@ -40,7 +44,7 @@ function showHeader({ name, role }) {
   byId("account").replaceChildren(who, element("span", { className: "role" }, role), out);
 }
 
-function pageLink({ name, path }) {
+function pageLink(/** @type {{ name: string, path: string }} */ { name, path }) {
   const link = element("a", { href: path }, name);
   if (path === location.pathname) link.setAttribute("aria-current", "page");
   return link;

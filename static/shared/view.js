@@ -5,15 +5,21 @@ import { finenessQuery } from "./fineness.js";
 
 const HIDE_VISER_PANEL = ".mantine-Paper-root, .mantine-Notifications-root { display: none !important }";
 
-/** Opens `viewUrl` in the iframe; `onWindow(window)` is called for each document that it loads. */
+/**
+ * Opens `viewUrl` in the iframe; `onWindow(window)` is called for each document that it loads.
+ *
+ * @param {string} viewUrl
+ * @param {(view: ViewWindow) => void} onWindow
+ */
 export function openView(viewUrl, onWindow) {
   const frame = byId("view");
   frame.addEventListener("load", () => {
-    hideViserPanel(frame.contentDocument);
-    onWindow(frame.contentWindow);
+    const view = /** @type {ViewWindow} */ (frame.contentWindow);
+    hideViserPanel(view.document);
+    onWindow(view);
     frame.classList.add("ready");
     byId("opening").hidden = true;
-    if (document.activeElement === document.body) frame.contentWindow.focus();
+    if (document.activeElement === document.body) view.focus();
   });
   frame.src = `${viewUrl}?hideViserLogo${finenessQuery()}`;
 }

@@ -1,6 +1,6 @@
 /** Setting a study up: a form, and beside it what it amounts to and the order that it leads to. */
 
-import { get, getAll, post } from "../shared/api.js";
+import { getAll, getDescription, post } from "../shared/api.js";
 import { byId, element, setText } from "../shared/dom.js";
 import { count } from "../shared/format.js";
 import { messageArea } from "../shared/message.js";
@@ -42,13 +42,16 @@ export async function showSetUp(pageMessage) {
     getAll("/api/studies"),
   ]);
   const taken = new Set(studies.map(({ name }) => name));
-  byId("seed").value = crypto.getRandomValues(new Uint32Array(1))[0] % 100000;
-  byId("dataset").replaceChildren(...datasets.map(({ id, name }) => new Option(name, id)));
+  byId("seed").value = String(crypto.getRandomValues(new Uint32Array(1))[0] % 100000);
+  byId("dataset").replaceChildren(...datasets.map(({ id, name }) => new Option(name, String(id))));
   byId("no-datasets").hidden = datasets.length > 0;
   byId("choose-things").hidden = datasets.length === 0;
   if (datasets.length) await loadThings();
   byId("dataset").addEventListener("change", () => loadThings().catch(pageMessage.problem));
-  form.addEventListener("input", ({ target }) => target.closest("[data-search]") || changed(fieldOf(target)));
+  form.addEventListener("input", ({ target }) => {
+    const input = /** @type {HTMLInputElement} */ (target);
+    if (!input.closest("[data-search]")) changed(fieldOf(input));
+  });
   form.addEventListener("submit", create);
   setText(byId("crumb-study"), "New study");
   byId("crumb-study").hidden = false;
@@ -170,7 +173,7 @@ export async function showSetUp(pageMessage) {
 
 /** What there is to choose, and what a plan is where nothing is chosen, the server says; returns the modes. */
 async function fillFromDescription() {
-  const { components } = await get("/api/openapi.json");
+  const { components } = await getDescription();
   const plan = components.schemas.StudyPlan.properties;
   for (const name of ["modes", "conditions"]) {
     const { items, default: first } = plan[name];
@@ -194,7 +197,8 @@ function tick(group, name, checked) {
 }
 
 function ticked(group) {
-  return [...document.querySelectorAll(`[name="${group}"]:checked`)].map(({ value }) => value);
+  const boxes = [...byId(`${group}-ticks`).querySelectorAll("input")];
+  return boxes.filter(({ checked }) => checked).map(({ value }) => value);
 }
 
 /** The field that an input belongs to: its own, or the group of ticks. */

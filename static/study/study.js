@@ -27,8 +27,9 @@ const erasing = (code) => ({
 });
 
 export async function showStudy(id, message) {
-  const url = `/api/studies/${id}`;
-  let study = null;
+  const url = /** @type {const} */ (`/api/studies/${id}`);
+  /** @type {Rest["StudyDetail"]} */
+  let study;
 
   byId("close-study").addEventListener("click", () =>
     askFirst(CLOSE, () => tried(() => post(`${url}/close`))),
@@ -49,7 +50,7 @@ export async function showStudy(id, message) {
 
   function drawStudy() {
     const { name, state, seed, plan, is_simulated: simulated } = study;
-    const { conditions, modes, tasks, groups } = plan;
+    const { conditions, modes, tasks, groups, questions } = /** @type {Required<Rest["StudyPlan"]>} */ (plan);
     const isOpen = state === "open";
     document.title = `${name} · Studies · Snap6D`;
     setText(byId("crumb-study"), name);
@@ -59,7 +60,7 @@ export async function showStudy(id, message) {
     byId("study-simulated").hidden = !simulated;
     byId("report").href = `/report/${id}`;
     byId("answers").href = `${url}/answers.csv`;
-    byId("answers").hidden = plan.questions.length === 0;
+    byId("answers").hidden = questions.length === 0;
     byId("close-study").hidden = !isOpen;
     const each = `${tasks.length * modes.length * conditions.length} tasks each`;
     setText(byId("study-about"), [conditions.join(", "), modes.join(", "), each, `seed ${seed}`].join(" · "));
@@ -93,18 +94,19 @@ export async function showStudy(id, message) {
   }
 
   function actions({ id: participant, code, group, total, withdrawn_at: withdrawn }) {
-    const path = `${url}/participants/${participant}`;
+    const path = /** @type {const} */ (`${url}/participants/${participant}`);
     const newLink = async () => showLink(await post(`${path}/link`), group);
     const renew = () => askFirst(renewing(code), () => tried(newLink));
     const withdraw = () => askFirst(withdrawing(code), () => tried(() => post(`${path}/withdraw`)));
     const erase = () => askFirst(erasing(code), () => tried(() => del(path)));
-    return [
-      study.state === "open" && !withdrawn && ["New link…", renew],
-      !withdrawn && ["Withdraw…", withdraw],
-      total > 0 && ["Erase…", erase],
-    ]
-      .filter(Boolean)
-      .map(([label, run]) => button([label, hiddenText(` ${code}`)], "button quiet", run));
+    const all = [
+      { isThere: study.state === "open" && !withdrawn, label: "New link…", run: renew },
+      { isThere: !withdrawn, label: "Withdraw…", run: withdraw },
+      { isThere: total > 0, label: "Erase…", run: erase },
+    ];
+    return all
+      .filter(({ isThere }) => isThere)
+      .map(({ label, run }) => button([label, hiddenText(` ${code}`)], "button quiet", run));
   }
 
   function showLink({ code, link }, group) {
@@ -147,7 +149,7 @@ async function copyText(text, copy) {
     await navigator.clipboard.writeText(text);
     setText(copy, "Copied");
   } catch {
-    getSelection().selectAllChildren(copy.previousElementSibling);
+    getSelection()?.selectAllChildren(copy.previousElementSibling);
     setText(copy, "Selected: copy it");
   }
 }

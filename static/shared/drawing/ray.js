@@ -3,6 +3,10 @@
 /**
  * How far along `towards` a ray from `origin` first meets a mesh {vertices, faces}, in lengths of `towards`; null
  * where it misses. Möller and Trumbore (1997), both sides of a face.
+ *
+ * @param {Mesh} mesh
+ * @param {Vector} origin
+ * @param {Vector} towards
  */
 export function firstHit({ vertices, faces }, [ox, oy, oz], [dx, dy, dz]) {
   let nearest = Infinity;
