@@ -1768,6 +1768,12 @@ export interface components {
             needs: number;
         };
         /**
+         * Actor
+         * @description Who acted, as the log marks it.
+         * @enum {string}
+         */
+        Actor: "human" | "script" | "machine";
+        /**
          * AdviceOut
          * @description At which error an operator should let the machine take over; metres and radians.
          */
@@ -2590,10 +2596,10 @@ export interface components {
             frames: "auto" | "current";
         };
         /**
-         * FramesReportOut
-         * @description What frames had to do with the result of a snap.
+         * FramesReport
+         * @description What frames had to do with a result.
          */
-        FramesReportOut: {
+        FramesReport: {
             /** Used */
             used: number;
             /** Agreeing */
@@ -3763,7 +3769,7 @@ export interface components {
             agreement: components["schemas"]["AgreementOut"] | null;
             /** Saved */
             saved: boolean;
-            snap: components["schemas"]["SnapOut"] | null;
+            snap: components["schemas"]["SnapStatus"] | null;
             offer: components["schemas"]["OfferOut"] | null;
             /** Is Live */
             is_live: boolean;
@@ -3853,6 +3859,11 @@ export interface components {
             truths: components["schemas"]["TruthOut"][];
             /** Remarks */
             remarks: components["schemas"]["RemarkOut"][];
+            /**
+             * Tables
+             * @description each a file NAME.csv and a file NAME.parquet
+             */
+            tables: string[];
         };
         /**
          * ResidualOut
@@ -4011,7 +4022,7 @@ export interface components {
             progress: number;
             /** Message */
             message: string | null;
-            standing: components["schemas"]["StandingOut"] | null;
+            standing: components["schemas"]["Standing"] | null;
             /**
              * Withheld
              * @description Why its result was only offered.
@@ -4020,37 +4031,32 @@ export interface components {
             estimate: components["schemas"]["EstimateOut"] | null;
         };
         /**
-         * SnapId
-         * @description The snap that was begun.
+         * SnapStatus
+         * @description How the last snap stands.
          */
-        SnapId: {
+        SnapStatus: {
             /** Id */
             id: string;
-        };
-        /**
-         * SnapOut
-         * @description The last snap of a registration.
-         */
-        SnapOut: {
-            /** Id */
-            id: string;
+            asked_by: components["schemas"]["Actor"];
             /**
-             * Asked By
-             * @description human, script, or in `auto` the machine by itself
+             * State
+             * @default queued
              */
-            asked_by: string;
-            /** State */
-            state: string;
-            /** Progress */
-            progress: number;
-            /** Message */
-            message: string | null;
+            state?: string;
             /**
              * Method
+             * @default default
              * @enum {string}
              */
-            method: "default" | "paper";
-            frames: components["schemas"]["FramesReportOut"] | null;
+            method?: "default" | "paper";
+            /**
+             * Progress
+             * @default 0
+             */
+            progress?: number;
+            /** Message */
+            message?: string | null;
+            frames?: components["schemas"]["FramesReport"] | null;
         };
         /**
          * SpanOut
@@ -4063,29 +4069,17 @@ export interface components {
             end: number;
         };
         /**
-         * StandingOut
-         * @description How a snap stands with the workers.
+         * Standing
+         * @description How a snap stands that has brought no result yet.
          */
-        StandingOut: {
-            /**
-             * Workers
-             * @description How many are there now.
-             */
+        Standing: {
+            /** Workers */
             workers: number;
-            /**
-             * Ahead
-             * @description How many snaps go before it.
-             */
+            /** Ahead */
             ahead: number;
-            /**
-             * Seconds
-             * @description How long it has waited or, once it runs, has run.
-             */
+            /** Seconds */
             seconds: number;
-            /**
-             * Preparing
-             * @description Whether it waits for its object, which workers build once.
-             */
+            /** Preparing */
             preparing: boolean;
         };
         /**
@@ -4460,7 +4454,7 @@ export interface components {
              */
             method: ("default" | "paper") | null;
             /** @description of the result of a snap, in how many it was found */
-            frames: components["schemas"]["FramesReportOut"] | null;
+            frames: components["schemas"]["FramesReport"] | null;
             /** Confidence */
             confidence: number | null;
             /**
@@ -6204,7 +6198,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["SnapId"];
+                    "application/json": components["schemas"]["SnapDetail"];
                 };
             };
         };

@@ -56,7 +56,7 @@ let task;
 let registration = null;
 /** @type {Set<string>} */
 let tools = new Set();
-/** @type {Promise<Rest["SnapId"]> | null} */
+/** @type {Promise<Rest["SnapDetail"]> | null} */
 let snapRequest = null;
 let steps = Promise.resolve(); // undo and redo under way, one after the other
 let stepsLeft = 0;

@@ -68,7 +68,7 @@ function tell(id, text, seconds) {
 /**
  * @param {string} state
  * @param {Registration["method"]} method
- * @param {Rest["StandingOut"]} standing
+ * @param {Rest["Standing"]} standing
  */
 function textFor(state, method, { workers, ahead, seconds, preparing }) {
   if (state === "running") return seconds < LONG_SECONDS[method] ? snappingText({ method }) : SLOW;
