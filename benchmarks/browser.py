@@ -19,7 +19,7 @@ from playwright.async_api import Page, async_playwright
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, server_on
 from benchmarks.viser_client import ViewClient
 from registration_core.geometry import pose
 from tests.e2e.conftest import CHROMIUM, CHROMIUM_ARGUMENTS, SHOWN_AROUND
@@ -58,10 +58,13 @@ class Watched:
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """The first demo object is dragged there and back before an open page."""
-    state = folder / "state"
-    prepare_state(state, [DEMO_SCENES])
-    with running_server(state) as server:
-        return asyncio.run(_measure(server, known_tasks(state)[0], 2 if quick else 30))
+    with server_on(folder, [DEMO_SCENES]) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """One object, first with the 3-D view left empty."""
+    return asyncio.run(_measure(server, known_tasks(server.state_dir)[0], 1 if quick else 30))
 
 
 def _figures(watched: Watched, view: str) -> list[Figure]:

@@ -9,7 +9,7 @@ from benchmarks.figures import Figure, Target
 from benchmarks.memory import IMPATIENT, megabytes, open_page, wait_until_closed
 from benchmarks.operators import signed_in_operators
 from benchmarks.scenes import known_tasks, write_full_frames
-from benchmarks.server import RunningServer, prepare_state, running_server
+from benchmarks.server import RunningServer, server_on
 
 TITLE = "Memory (resident) of the application after pages were opened and closed for ten minutes"
 TARGET = Target(1.10)
@@ -21,12 +21,15 @@ SECONDS = 600.0
 
 
 def run(folder: Path, quick: bool) -> list[Figure]:
-    """Operators open four pages, each on the next frame, close them, and wait until their sessions are."""
+    """Twenty frames, and a server that closes sessions soon."""
     write_full_frames(folder / "frames", AT_ONCE if quick else FRAMES)
-    state = folder / "state"
-    prepare_state(state, [folder / "frames"])
-    with running_server(state, command=IMPATIENT) as server:
-        return asyncio.run(_measure(server, 1 if quick else ROUNDS_BEFORE, 0.0 if quick else SECONDS))
+    with server_on(folder, [folder / "frames"], IMPATIENT) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """Operators open four pages, each on the next frame, close them, and wait until their sessions are."""
+    return asyncio.run(_measure(server, 1 if quick else ROUNDS_BEFORE, 0.0 if quick else SECONDS))
 
 
 async def _measure(server: RunningServer, rounds_before: int, seconds: float) -> list[Figure]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import psutil
 
 from benchmarks.figures import Figure, Target
-from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, server_on
 
 TITLE = "A server that nobody uses: share of a core that it takes"
 TARGET = Target(2.0)
@@ -16,14 +16,17 @@ SECONDS_TO_SETTLE, SECONDS_TO_WATCH = 60.0, 60.0
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """The demo scenes, and nobody signed in."""
+    with server_on(folder, [DEMO_SCENES]) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """A look at the processes, and another one later."""
     settle, watch = (0.0, 1.0) if quick else (SECONDS_TO_SETTLE, SECONDS_TO_WATCH)
-    state = folder / "state"
-    prepare_state(state, [DEMO_SCENES])
-    with running_server(state) as server:
-        time.sleep(settle)
-        before = _seconds_of_work(server)
-        time.sleep(watch)
-        after = _seconds_of_work(server)
+    time.sleep(settle)
+    before = _seconds_of_work(server)
+    time.sleep(watch)
+    after = _seconds_of_work(server)
     shares = {pid: 100.0 * (after[pid] - before.get(pid, 0.0)) / watch for pid in after}
     return [
         Figure("the application", shares[server.process.pid], "%"),

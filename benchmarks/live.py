@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, server_on
 from benchmarks.viser_client import Array, ViewClient
 from registration_core.geometry import pose
 
@@ -38,10 +38,13 @@ class Watched:
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """Each demo object of the first scene is dragged about the truth, with live snapping and without."""
-    state = folder / "state"
-    prepare_state(state, [DEMO_SCENES])
-    with running_server(state) as server:
-        with_live, without_live = asyncio.run(_measure(server, 1 if quick else 5, 1 if quick else 4))
+    with server_on(folder, [DEMO_SCENES]) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """So many drags of each object without live snapping, and as many with it."""
+    with_live, without_live = asyncio.run(_measure(server, 1 if quick else 5, 1 if quick else 4))
     live, without = (percentile(watched.gaps, 50) for watched in (with_live, without_live))
     count = len(with_live.seconds_to_result)
     return [

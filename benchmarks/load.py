@@ -13,7 +13,7 @@ from benchmarks.bookkeeping import Comparison, Finished, compare_all
 from benchmarks.figures import Figure, Target, spread
 from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, database_of, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, database_of, server_on
 from benchmarks.viser_client import ViewClient
 from registration_core.geometry import pose
 
@@ -89,11 +89,10 @@ def run(folder: Path, quick: bool) -> list[Figure]:
     return [figure for count in crews for figure in _crew(folder / str(count), count, seconds)]
 
 
-def _crew(state: Path, count: int, seconds: float) -> list[Figure]:
-    prepare_state(state, [DEMO_SCENES])
-    with running_server(state) as server:
+def _crew(folder: Path, count: int, seconds: float) -> list[Figure]:
+    with server_on(folder, [DEMO_SCENES]) as server:
         shifts = asyncio.run(_work_together(server, count, seconds))
-        with database_of(state) as database:
+        with database_of(server.state_dir) as database:
             comparison = compare_all(database, [shift.finished for shift in shifts])
     return _figures(shifts, comparison, seconds)
 

@@ -10,7 +10,7 @@ from sqlalchemy import select
 from app.storage.tables import Frame, Object, Registration, Scene, Task, User
 from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
-from benchmarks.server import DEMO_SCENES, RunningServer, database_of, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, database_of, server_on
 
 TITLE = "The home page of 10,000 tasks"
 TARGET = Target(1.0)
@@ -29,13 +29,16 @@ SLOWEST = ("/api/tasks?limit=48&state=submitted&after=9000", "/api/tasks?limit=4
 
 
 def run(folder: Path, quick: bool) -> list[Figure]:
+    """A server on the demo scenes."""
+    with server_on(folder, [DEMO_SCENES]) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
     """The rows are written as an import would write them; of half the tasks, somebody has taken up each."""
     scenes = 10 if quick else SCENES
-    state = folder / "state"
-    prepare_state(state, [DEMO_SCENES])
-    _add_scenes(state, scenes)
-    with running_server(state) as server:
-        return asyncio.run(_measure(server, scenes * OBJECTS))
+    _add_scenes(server.state_dir, scenes)
+    return asyncio.run(_measure(server, scenes * OBJECTS))
 
 
 def _add_scenes(state: Path, count: int) -> None:

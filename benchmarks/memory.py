@@ -12,13 +12,15 @@ from benchmarks.figures import Figure, Target
 from benchmarks.impatient_server import IDLE_SECONDS
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import known_tasks, write_full_frames
-from benchmarks.server import RunningServer, prepare_state, running_server
+from benchmarks.server import RunningServer, server_on
 
 TITLE = "Memory (resident) with open sessions of 300,000 points, each on a frame of its own"
 TARGET = Target(700.0)
 FOLDER = "snap6d-view-"
 """Where the socket file of a view lies."""
 IMPATIENT = (sys.executable, "-m", "benchmarks.impatient_server", "serve")
+COUNTS, QUICK_COUNTS = (1, 5, 20), (1, 2)
+"""Numbers of sessions at which memory is looked at."""
 SECONDS_TO_SETTLE = 3.0
 SECONDS_TO_CLOSE = 30.0
 
@@ -28,18 +30,21 @@ class SessionsStayError(Exception):
 
 
 def run(folder: Path, quick: bool) -> list[Figure]:
+    """A frame for each session, and a server that closes sessions soon."""
+    write_full_frames(folder / "frames", (QUICK_COUNTS if quick else COUNTS)[-1])
+    with server_on(folder, [folder / "frames"], IMPATIENT) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
     """Sessions are opened one after the other and closed together."""
-    counts = (1, 2) if quick else (1, 5, 20)
-    write_full_frames(folder / "frames", counts[-1])
-    state = folder / "state"
-    prepare_state(state, [folder / "frames"])
-    with running_server(state, command=IMPATIENT) as server:
-        return asyncio.run(_measure(server, counts, settle=0.0 if quick else SECONDS_TO_SETTLE))
+    counts, settle = (QUICK_COUNTS, 0.0) if quick else (COUNTS, SECONDS_TO_SETTLE)
+    return asyncio.run(_measure(server, counts, settle))
 
 
 async def _measure(server: RunningServer, counts: tuple[int, ...], settle: float) -> list[Figure]:
     figures = _figures(server, "no session yet")
-    tasks = known_tasks(server.state_dir)
+    tasks = known_tasks(server.state_dir)[: counts[-1]]
     async with signed_in_operators(server, counts[-1]) as operators:
         async with AsyncExitStack() as pages:
             for number, (operator, task) in enumerate(zip(operators, tasks, strict=True), start=1):

@@ -9,11 +9,12 @@ from app.datasets.scene_data import CLOUD_POINTS
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import known_tasks, write_full_frames
-from benchmarks.server import RunningServer, prepare_state, running_server
+from benchmarks.server import RunningServer, server_on
 from tests.app.labeling.viser_client import GIZMO
 
 TITLE = "Opening a task: from POST /api/tasks/{id}/registration to the whole scene on the wire"
 TARGET = Target(1.0)
+TASKS, QUICK_TASKS = 10, 2
 SCENE = frozenset({"/cloud", GIZMO, f"{GIZMO}/mesh"})
 
 
@@ -23,15 +24,18 @@ class IncompleteSceneError(Exception):
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """Every task has a frame of its own, so that a first opening finds nothing in memory."""
-    write_full_frames(folder / "frames", 2 if quick else 10)
-    state = folder / "state"
-    prepare_state(state, [folder / "frames"])
-    with running_server(state) as server:
-        return asyncio.run(_measure(server))
+    write_full_frames(folder / "frames", QUICK_TASKS if quick else TASKS)
+    with server_on(folder, [folder / "frames"]) as server:
+        return measure(server, quick)
 
 
-async def _measure(server: RunningServer) -> list[Figure]:
-    tasks = [task.id for task in known_tasks(server.state_dir)]
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """Each task is opened three times."""
+    return asyncio.run(_measure(server, QUICK_TASKS if quick else TASKS))
+
+
+async def _measure(server: RunningServer, count: int) -> list[Figure]:
+    tasks = [task.id for task in known_tasks(server.state_dir)[:count]]
     async with signed_in_operators(server, 2) as (first, second):
         cold = [await _seconds_to_open(first, task) for task in tasks]
         warm = [await _seconds_to_open(second, task) for task in tasks]

@@ -81,6 +81,17 @@ def sign_in_secrets(state_dir: Path, count: int) -> list[str]:
 
 
 @contextmanager
+def server_on(
+    folder: Path, datasets: Sequence[Path], command: Sequence[str] = SERVE
+) -> Iterator[RunningServer]:
+    """A running server in this folder that has imported these BOP datasets, and nothing else."""
+    state = folder / "state"
+    prepare_state(state, datasets)
+    with running_server(state, command=command) as server:
+        yield server
+
+
+@contextmanager
 def running_server(
     state_dir: Path, *arguments: str, command: Sequence[str] = SERVE
 ) -> Iterator[RunningServer]:

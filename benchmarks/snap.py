@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.figures import Figure, Target, percentile, spread
 from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, server_on
 from registration_core.geometry import pose_error
 
 TITLE = "Snap on the demo scenes: from POST .../snaps to the result on the stream"
@@ -39,10 +39,13 @@ class Snapped:
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """From 2 cm and 15 degrees off the truth; the first snap of each object is measured on its own."""
-    state = folder / "state"
-    prepare_state(state, [DEMO_SCENES])
-    with running_server(state) as server:
-        return asyncio.run(_measure(server, tasks=2 if quick else None, snaps=1 if quick else 4))
+    with server_on(folder, [DEMO_SCENES]) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """At every task, one after the other."""
+    return asyncio.run(_measure(server, tasks=1 if quick else None, snaps=1 if quick else 4))
 
 
 async def _measure(server: RunningServer, tasks: int | None, snaps: int) -> list[Figure]:

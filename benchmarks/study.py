@@ -49,7 +49,7 @@ class Look:
 
 def run(folder: Path, quick: bool) -> list[Figure]:
     """The run, and another one with twice the operators."""
-    datasets = [DEMO_SCENES, *([DATA / "ycbv"] if DATA.is_dir() else [])]
+    datasets = [DEMO_SCENES, *([DATA / "ycbv"] if DATA.is_dir() and not quick else [])]
     operators, scenes = (1, 1) if quick else (OPERATORS, SCENES)
     once, twice = (_study(folder / f"{n}", datasets, n, scenes) for n in (operators, 2 * operators))
     total = _seconds(once)

@@ -12,7 +12,7 @@ from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.registration.objects import DATA, ycb_object
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, prepare_state, running_server
+from benchmarks.server import DEMO_SCENES, RunningServer, server_on
 from registration_core.geometry import pose
 
 TITLE = "Aligning an object within 5 mm and 5°, from 20 cm and 45° off: a scripted operator"
@@ -38,11 +38,13 @@ class Aligned:
 def run(folder: Path, quick: bool) -> list[Figure]:
     """Every object of the first demo scene, and of the real frames where they are there."""
     datasets = [DEMO_SCENES, *([DATA / "ycbv"] if DATA.is_dir() and not quick else [])]
-    state = folder / "state"
-    prepare_state(state, datasets)
-    with running_server(state) as server:
-        results = asyncio.run(_measure(server, 1 if quick else None))
-    return _figures(results)
+    with server_on(folder, datasets) as server:
+        return measure(server, quick)
+
+
+def measure(server: RunningServer, quick: bool) -> list[Figure]:
+    """Each object by each technique, from the same start."""
+    return _figures(asyncio.run(_measure(server, 1 if quick else None)))
 
 
 async def _measure(server: RunningServer, most: int | None) -> list[Aligned]:

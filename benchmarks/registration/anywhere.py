@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 
 import numpy as np
 
@@ -9,7 +10,6 @@ from benchmarks.figures import Figure, Target, percentile
 from benchmarks.registration.instances import Instance
 from benchmarks.registration.judging import Judge
 from benchmarks.registration.methods import polished_truth, warmed_up
-from benchmarks.registration.trials import single_threaded_pool
 from registration_core import propose
 from registration_core.rendering.rasterizer import render_depth
 
@@ -20,17 +20,17 @@ MARGIN = 40
 """Pixels about the object that a person who draws a region leaves."""
 
 
-def proposal_figures(instances: Sequence[Instance], searches: int) -> list[Figure]:
+def proposal_figures(pool: Executor, instances: Sequence[Instance], searches: int) -> list[Figure]:
     """Shares found and seconds, in whole images and in regions as a person draws them.
 
     Args:
+        pool: which has nothing else to do.
         searches: over all instances; each has at least one.
     """
     if not instances:
         return []
     seeds = max(1, searches // len(instances))
-    with single_threaded_pool(1) as pool:
-        return pool.submit(_figures, instances, seeds).result()
+    return pool.submit(_figures, instances, seeds).result()
 
 
 def _figures(instances: Sequence[Instance], seeds: int) -> list[Figure]:

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 
 from rich.console import Console
@@ -45,7 +46,7 @@ from benchmarks.registration.methods import (
 from benchmarks.registration.objects import DATA
 from benchmarks.registration.overlays import write_overlays
 from benchmarks.registration.several_views import view_figures
-from benchmarks.registration.starts import GOOD, MIDDLE, NEAR, SHELLS, Shell
+from benchmarks.registration.starts import GOOD, MIDDLE, SHELLS, Shell
 from benchmarks.registration.tables import (
     print_confidences,
     print_made_worse,
@@ -54,7 +55,7 @@ from benchmarks.registration.tables import (
 )
 from benchmarks.registration.targets import figures
 from benchmarks.registration.timing import timings
-from benchmarks.registration.trials import run_trials
+from benchmarks.registration.trials import run_trials, single_threaded_pool
 
 OVERLAYS_VARIABLE = "BENCHMARK_OVERLAYS"
 TABLE_WIDTH = 120
@@ -62,10 +63,10 @@ TABLE_WIDTH = 120
 
 AN_OBJECT, OF_A_SENSOR = 8, 3
 """Instances of each object in each plain synthetic set, and with each sensor and the wrong meshes."""
-QUICK_SETS = (HALF, SENSORS[0], YCB)
+QUICK_SETS = (HALF, YCB)
 """One instance of each makes a quick run."""
-QUICK_SCENES = 3
-"""Of each synthetic set then; they hold at least one instance."""
+QUICK_SCENES = 1
+"""Of each synthetic set then; it holds at least one instance."""
 STARTS = dict.fromkeys(SYNTHETIC, 5) | {YCB: 20, BUNNY: 20, MORO: 6, APC: 20, RBT: 8}
 """From each shell about each instance: fewer where there are many instances."""
 WIDELY_STARTED = (*PLAIN, YCB, BUNNY)
@@ -95,8 +96,11 @@ def measure(quick: bool) -> list[Figure]:
     plans = [
         _quick_plan(choice) if quick else _plan(one, number, choice) for number, one in enumerate(instances)
     ]
-    timed = [] if choice.is_part else timings([one for one in instances if one.set_name == HALF], quick)
-    results = run_trials(instances, plans, quick, console)
+    with single_threaded_pool() as pool:
+        half = [one for one in instances if one.set_name == HALF]
+        timed = [] if choice.is_part else timings(pool, half, quick)
+        results = run_trials(pool, instances, plans, quick, console)
+        beside = [] if choice.is_part else _beside_trials(pool, instances, quick, console)
     trials = [trial for result in results for trial in result.trials]
     for name in choice.sets:
         print_tables(console, trials, name)
@@ -108,7 +112,7 @@ def measure(quick: bool) -> list[Figure]:
             print_reliability(console, some, title)
     if folder := os.environ.get(OVERLAYS_VARIABLE):
         write_overlays(Path(folder), instances, trials)
-    return [*figures(results), *([] if choice.is_part else _beside_trials(instances, quick, console)), *timed]
+    return [*figures(results), *beside, *timed]
 
 
 def _instances(choice: Choice, quick: bool) -> list[Instance]:
@@ -125,7 +129,9 @@ def _of_set(name: str, scenes: int) -> list[Instance]:
     return inexact_instances(OF_A_SENSOR, scenes) if name == INEXACT else real_instances(name)
 
 
-def _beside_trials(instances: Sequence[Instance], quick: bool, console: Console) -> list[Figure]:
+def _beside_trials(
+    pool: Executor, instances: Sequence[Instance], quick: bool, console: Console
+) -> list[Figure]:
     """What is measured of snaps without trials of single starts."""
     plain = [one for one in instances if one.set_name in PLAIN]
     print_agreement(console, plain[::INSTANCES_AN_AGREEMENT])
@@ -133,9 +139,9 @@ def _beside_trials(instances: Sequence[Instance], quick: bool, console: Console)
     proposed = [
         figure
         for name in REAL
-        for figure in proposal_figures([one for one in instances if one.set_name == name], searches)
+        for figure in proposal_figures(pool, [one for one in instances if one.set_name == name], searches)
     ]
-    return [*view_figures(quick), *proposed]
+    return [*view_figures(pool, quick), *proposed]
 
 
 def _plan(instance: Instance, number: int, choice: Choice) -> dict[Shell, Mapping[str, int]]:
@@ -155,4 +161,4 @@ def _plan(instance: Instance, number: int, choice: Choice) -> dict[Shell, Mappin
 
 
 def _quick_plan(choice: Choice) -> dict[Shell, Mapping[str, int]]:
-    return dict.fromkeys((NEAR, MIDDLE, GOOD), dict.fromkeys(choice.methods, 1))
+    return dict.fromkeys((MIDDLE, GOOD), dict.fromkeys(choice.methods, 1))

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from concurrent.futures import Executor
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from benchmarks.registration.methods import BEST_OF, DEFAULT, PAPER, polished_tr
 from benchmarks.registration.objects import DATA, ycb_object
 from benchmarks.registration.starts import SHELLS, starts
 from benchmarks.registration.statistics import percentiles
-from benchmarks.registration.trials import single_threaded_pool
 from registration_core import SnapConfig
 from registration_core.geometry.kernels import f4, to_rows
 from registration_core.paper.particle_filter import Noise, initial_poses
@@ -28,10 +28,9 @@ MODEL_OF_16K_FACES = 15
 """The YCB set's drill."""
 
 
-def timings(instances: Sequence[Instance], quick: bool) -> list[Figure]:
-    """Figures from starts about synthetic instances of 640x480 pixels."""
-    with single_threaded_pool(1) as pool:
-        return pool.submit(_timings, instances, quick).result()
+def timings(pool: Executor, instances: Sequence[Instance], quick: bool) -> list[Figure]:
+    """Figures from starts about synthetic instances of 640x480 pixels; the pool has nothing else to do."""
+    return pool.submit(_timings, instances, quick).result()
 
 
 def _timings(instances: Sequence[Instance], quick: bool) -> list[Figure]:

@@ -3,7 +3,7 @@
 import multiprocessing
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -63,30 +63,32 @@ class InstanceTrials:
 
 
 def run_trials(
-    instances: Sequence[Instance], plans: Sequence[Plan], quick: bool, console: Console
+    pool: Executor, instances: Sequence[Instance], plans: Sequence[Plan], quick: bool, console: Console
 ) -> list[InstanceTrials]:
     """Every instance by its plan, in the order of the instances."""
     results: dict[int, InstanceTrials] = {}
-    with single_threaded_pool(len(os.sched_getaffinity(0))) as pool:
-        futures = {
-            pool.submit(try_instance, instance, n, plan, quick): n
-            for n, (instance, plan) in enumerate(zip(instances, plans, strict=True))
-        }
-        for future in as_completed(futures):
-            results[futures[future]] = future.result()
-            if len(results) % 10 == 0 or len(results) == len(instances):
-                console.print(f"{len(results)} of {len(instances)} instances", style="dim")
+    futures = {
+        pool.submit(try_instance, instance, n, plan, quick): n
+        for n, (instance, plan) in enumerate(zip(instances, plans, strict=True))
+    }
+    for future in as_completed(futures):
+        results[futures[future]] = future.result()
+        if len(results) % 10 == 0 or len(results) == len(instances):
+            console.print(f"{len(results)} of {len(instances)} instances", style="dim")
     return [results[n] for n in sorted(results)]
 
 
 @contextmanager
-def single_threaded_pool(processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Processes that start anew with one thread each: libraries read their number of threads only once."""
+def single_threaded_pool() -> Iterator[Executor]:
+    """A process for each processor, with one thread each, and none before there is work for it.
+
+    They start anew: libraries read their number of threads only once.
+    """
     before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     context = multiprocessing.get_context("spawn")
     try:
-        with ProcessPoolExecutor(processes, context) as pool:
+        with ProcessPoolExecutor(len(os.sched_getaffinity(0)), context) as pool:
             yield pool
     finally:
         for name, value in before.items():
