@@ -16,6 +16,8 @@ from tests.tools.attack.malformed import attack_bodies, attack_headers
 from tests.tools.attack.routes import attack_routes, needed
 from tests.tools.attack.target import Outcome, Target, target_of
 
+pytestmark = pytest.mark.slow  # a server in a process of its own
+
 __all__ = [
     "cluster",
     "demo",

@@ -24,6 +24,8 @@ from tests.app.small_dataset import true_pose
 from tests.app.waiting import LONGEST, wait_until
 from tests.processes import Server, command_line, descendants, serving
 
+pytestmark = pytest.mark.slow  # servers in processes of their own
+
 T_OBJECT_GIZMO = pose.from_rotation_translation(np.eye(3), model_of(mesh_of(TOOL)).centre)
 
 

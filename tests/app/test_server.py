@@ -4,6 +4,7 @@ import signal
 from pathlib import Path
 
 import httpx
+import pytest
 
 from app.config import Settings
 from app.server import prepare_state
@@ -11,6 +12,8 @@ from app.storage.database import Database
 from app.storage.tables import Dataset, Task
 from tests.app.waiting import LONGEST, wait_until
 from tests.processes import command_line, descendants, failure, run_snap6d, serving
+
+pytestmark = pytest.mark.slow  # servers in processes of their own
 
 
 def test_a_scheduler_that_does_not_answer_is_said(state_dir):

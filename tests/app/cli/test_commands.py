@@ -133,6 +133,7 @@ def test_a_flag_out_of_range_is_named(snap6d, tmp_path):
     assert message.startswith("setting workers (SNAP6D_WORKERS) is 1000: ")
 
 
+@pytest.mark.slow
 def test_an_empty_database_is_said(snap6d, tmp_path):
     message = "the database is empty; run `snap6d migrate` first"
     for command in (["import", "."], ["export", "x", "y"], ["token", "create", "x"], ["user", "add", "x"]):
@@ -140,6 +141,7 @@ def test_an_empty_database_is_said(snap6d, tmp_path):
     assert failure(run_snap6d(tmp_path, "serve", "--port", "0")) == message
 
 
+@pytest.mark.slow
 def test_a_newer_database_is_said(snap6d, state):
     connection = sqlite3.connect(state / "snap6d.sqlite")
     connection.execute("UPDATE alembic_version SET version_num = '9999'")
@@ -163,6 +165,7 @@ def test_another_database_may_be_given(snap6d, tmp_path):
     assert "no SQLAlchemy address" in failure(wrong)
 
 
+@pytest.mark.slow
 def test_export_writes_a_zip_or_says_why_not(snap6d, tmp_path, demo):
     site = make_site(tmp_path)
     import_dataset(site.database, FileStore(tmp_path / "files"), demo)

@@ -51,6 +51,7 @@ def submit_floating(site: Site, user: int = 0) -> None:
     site.submit(site.tasks[POSED, TOOL], NEAR_VIEW @ T_camera_object, user, minutes=1.0)
 
 
+@pytest.mark.slow
 def test_the_same_annotations_give_the_same_bytes(site: Site, tmp_path: Path) -> None:
     site.submit_all()
     summary = export(site, tmp_path / "1.zip")
@@ -124,6 +125,7 @@ def test_a_job_ends_with_a_stored_zip(site: Site) -> None:
     )
 
 
+@pytest.mark.slow
 def test_equal_exports_are_stored_once(site: Site) -> None:
     site.submit_all()
     jobs = [request(site) for _ in range(2)]
@@ -259,6 +261,7 @@ def test_only_a_queued_export_is_started(site: Site) -> None:
         run_job(site.database, site.files, 99)
 
 
+@pytest.mark.slow
 def test_a_job_runs_as_a_process_of_its_own(site: Site) -> None:
     site.submit_all()
     export_id = request(site)

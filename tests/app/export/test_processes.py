@@ -22,6 +22,8 @@ from tests.app.small_dataset import TOOL, true_pose
 from tests.app.waiting import wait_until
 from tests.processes import command_line, descendants
 
+pytestmark = pytest.mark.slow  # exports in processes of their own
+
 
 @pytest.fixture
 def settings(state_dir: Path) -> Settings:

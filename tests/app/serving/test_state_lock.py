@@ -20,6 +20,8 @@ from app.storage.tables import Export, User
 from tests.app.waiting import LONGEST
 from tests.processes import failure, run_snap6d, serving
 
+pytestmark = pytest.mark.slow  # servers in processes of their own
+
 HOLDER = """
 import signal, sys
 from pathlib import Path

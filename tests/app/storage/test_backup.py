@@ -10,6 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import httpx
+import pytest
 from sqlalchemy import func, select
 
 from app.config import Settings
@@ -59,6 +60,7 @@ def restored(archive: Path, folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_backup_amid_writes_holds_what_was_saved_and_all_its_files(state_dir: Path, tmp_path: Path) -> None:
     archive = tmp_path / "backup.tar"
     with closing(Database(Settings(state_dir=state_dir).resolved_database_url)) as database:
@@ -80,6 +82,7 @@ def test_a_backup_amid_writes_holds_what_was_saved_and_all_its_files(state_dir: 
     assert saved is not None and before <= saved <= after + 1
 
 
+@pytest.mark.slow
 def test_a_server_starts_on_what_a_running_one_was_backed_up_to(state_dir: Path, tmp_path: Path) -> None:
     archive = tmp_path / "backup.tar"
 

@@ -23,6 +23,8 @@ from tests.app.test_kill import T_OBJECT_GIZMO, signed_in
 from tests.app.waiting import wait_until
 from tests.processes import Server, failure, run_snap6d, start_server
 
+pytestmark = pytest.mark.slow  # servers in processes of their own
+
 BYTES = 16 << 20
 NOT_SAVED = "The last drag could not be saved and was taken back: "
 

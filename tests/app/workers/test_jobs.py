@@ -17,6 +17,8 @@ from tests.app.export.site import CAMERA
 from tests.app.snap_jobs import DEPTH, T_CAMERA_TOOL, assert_same, done_here, new_job, new_model, view_of
 from tests.app.waiting import LONGEST, wait_until
 
+pytestmark = pytest.mark.slow  # starts workers
+
 
 @pytest.fixture(scope="module")
 def client(cluster: str) -> Iterator[Client]:

@@ -34,6 +34,8 @@ from tests.app.snap_jobs import (
 )
 from tests.app.waiting import LONGEST, wait_until
 
+pytestmark = pytest.mark.slow  # starts workers
+
 SLOW = SnapConfig.from_dict(SLOW_SNAP)
 
 

@@ -17,6 +17,8 @@ from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import knowing, new_job, new_model, pids, request, result_of, store_in
 from tests.app.waiting import LONGEST, wait_until
 
+pytestmark = pytest.mark.slow  # starts workers
+
 SLOW = SnapConfig.from_dict(SLOW_SNAP)
 
 

@@ -13,6 +13,8 @@ from distributed.security import Security
 from app.workers.pool import start_workers
 from tests.app.waiting import LONGEST
 
+pytestmark = pytest.mark.slow  # starts workers
+
 NO_CERTIFICATES = Security(require_encryption=False)
 
 

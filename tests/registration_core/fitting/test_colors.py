@@ -1,23 +1,34 @@
 """Colour images for fitting: of the scene that the depth shows."""
 
+from functools import cache
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from registration_core.fitting.colors import colored
 from registration_core.fitting.objects import random_object
-from registration_core.fitting.scenes import FIRST, SETTINGS, picture
+from registration_core.fitting.scenes import FIRST, SETTINGS, Picture, picture
 from registration_core.search.color_edges import color_changes, color_is_aligned
 
+pytestmark = pytest.mark.slow  # makes pictures of many scenes
+
 MODELS = [random_object(kind, 0).model for kind in ("mug", "carton", "gear", "bowl", "figure")]
+
+
+@cache
+def seen(setting: str, seed: int) -> tuple[Picture, NDArray[np.uint8]]:
+    """A picture and its colours, made once for all tests."""
+    rng = np.random.default_rng(seed)
+    view = picture(setting, MODELS, rng, 2.0)
+    return view, colored(view, rng)
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_colours_change_most_where_things_end(setting) -> None:
     told = []
-    for seed in range(6):
-        rng = np.random.default_rng(seed)
-        view = picture(setting, MODELS, rng, 2.0)
-        color = colored(view, rng)
+    for seed in range(3):
+        view, color = seen(setting, seed)
         assert color.shape == (*view.depth.shape, 3) and color.dtype == np.uint8
         ends = np.zeros(view.labels.shape, np.bool_)
         ends[:, 1:] = view.labels[:, 1:] != view.labels[:, :-1]
@@ -29,10 +40,9 @@ def test_colours_change_most_where_things_end(setting) -> None:
 
 def test_most_of_them_are_found_to_be_aligned() -> None:
     found = []
-    for seed in range(12):
-        rng = np.random.default_rng(seed)
-        view = picture("clutter", MODELS, rng, 2.0)
-        found.append(color_is_aligned(colored(view, rng), view.depth))
+    for seed in range(7):
+        view, color = seen("clutter", seed)
+        found.append(color_is_aligned(color, view.depth))
     assert np.mean(found) > 0.7
 
 

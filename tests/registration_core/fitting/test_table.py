@@ -17,6 +17,7 @@ def table() -> FeatureTable:
     return read_table()
 
 
+@pytest.mark.slow
 def test_the_committed_numbers_are_what_the_committed_table_gives(capsys) -> None:
     assert check() == 0
     assert "are what the feature table gives" in capsys.readouterr().out

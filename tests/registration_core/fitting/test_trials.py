@@ -14,6 +14,7 @@ def trials() -> list[Trial]:
     return scene_trials(0, 0)
 
 
+@pytest.mark.slow
 def test_a_scene_gives_the_same_trials_again(trials) -> None:
     again = scene_trials(0, 0)
     assert len(trials) == len(again) > 0

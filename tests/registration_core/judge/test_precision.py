@@ -66,6 +66,7 @@ def test_a_turn_of_a_round_thing_counts_for_nothing(mesh, free) -> None:
     assert len(free) == 3 or spread(np.diag(across), model) > 10.0 * spread(np.diag(held), model)
 
 
+@pytest.mark.slow
 def test_slivers_have_no_say() -> None:
     mesh = can()
     on_an_edge = np.array([[0.03, 0.0, z] for z in (-0.05, 0.013, 0.05)])

@@ -35,7 +35,7 @@ def offset(T: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(T[:3, 3] - truth[:3, 3]))
 
 
-@pytest.mark.parametrize("method", ["viewpoint", "particle_filter"])
+@pytest.mark.parametrize("method", ["viewpoint", pytest.param("particle_filter", marks=pytest.mark.slow)])
 def test_snap_passes_by_a_twin_that_is_known(pair, method) -> None:
     model, depth, done, sought = pair
     start = on_table(0.0, 0.01, 0.7)  # nearer to the twin

@@ -153,6 +153,7 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_without_a_graphics_driver_the_error_says_what_to_install():
     code = (
         "from registration_core.geometry.camera import Intrinsics\n"
@@ -164,6 +165,7 @@ def test_without_a_graphics_driver_the_error_says_what_to_install():
     assert "apt-get install libegl1" in done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_importing_the_module_does_not_load_opengl():
     code = (
         "import sys, registration_core.rendering.opengl; print(len({'pyrender', 'OpenGL'} & {*sys.modules}))"

@@ -87,6 +87,7 @@ def test_flat_mesh_seen_edge_on_stays_finite() -> None:
     assert np.isfinite(built.area).all()
 
 
+@pytest.mark.slow
 def test_large_mesh_is_thinned() -> None:
     mesh = trimesh.creation.icosphere(subdivisions=6, radius=RADIUS)
     assert len(mesh.faces) > 80_000

@@ -21,6 +21,8 @@ from registration_core.synthetic.objects import demo_objects
 from registration_core.synthetic.scene import CAMERA, Silhouette, table_model
 from registration_core.synthetic.tabletop import Layout, Placed
 
+pytestmark = pytest.mark.slow  # renders whole scenes
+
 REPOSITORY = Path(__file__).resolve().parents[3]
 MODELS = [known.model for known in demo_objects()]
 
@@ -172,7 +174,7 @@ def test_lower_cameras_see_more_occlusion():
     for elevation in ((0.9, 1.2), (0.15, 0.3)):
         views = [
             make_scene(np.random.default_rng(k), MODELS, layout=Layout(elevation=elevation)).views[0]
-            for k in range(5)
+            for k in range(3)
         ]
         means.append(np.mean([instance.visible for view in views for instance in view.instances]))
     assert means[1] < means[0] - 0.1

@@ -101,6 +101,7 @@ def test_the_figure_is_an_svg_whose_words_can_be_read_and_a_pdf(report):
     assert pdf.startswith(b"%PDF") and b"CreationDate" not in pdf
 
 
+@pytest.mark.slow
 def test_simulated_is_said_everywhere():
     simulated = report_of(collected_of(four("P1", is_simulated=True), is_simulated=True), ReportConfig())
     assert "simulated operators" in file_of(simulated, "figure.svg").decode()
@@ -123,6 +124,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_says_what_was_handled(report)
     assert "<script" not in html and 'src="' not in html and "<link" not in html
 
 
+@pytest.mark.slow
 def test_techniques_have_a_figure_each_and_are_compared_in_pairs_in_the_page():
     trials = (four("P1"), four("P1", condition="find it"), four("P2"), four("P2", condition="find it"))
     techniques = report_of(collected_of(*trials), ReportConfig())
@@ -133,6 +135,7 @@ def test_techniques_have_a_figure_each_and_are_compared_in_pairs_in_the_page():
     assert ": manual</text>" in svg and ": find it</text>" not in svg
 
 
+@pytest.mark.slow
 def test_both_methods_stand_side_by_side_in_figure_page_and_tables():
     by_paper = {"paper_translation": [0.02, 0.02, NAN, 0.005], "paper_rotation": [0.5, 0.4, NAN, 0.2]}
     both = report_of(collected_of(four("P1", **by_paper), four("P2", **by_paper)), ReportConfig())
@@ -168,6 +171,7 @@ def test_idle_time_is_said_whether_or_not_it_counts():
     assert "idle time" not in "".join(map(str, report_of(collected_of(four("P1")), ReportConfig()).remarks))
 
 
+@pytest.mark.slow
 def test_the_same_trials_give_the_same_bytes_in_any_order(report, tmp_path):
     again = report_of(collected_of(*reversed(report.collected.trials)), ReportConfig())
     paths = write_report(again, tmp_path / "out")

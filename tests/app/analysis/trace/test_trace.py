@@ -108,6 +108,7 @@ def test_an_empty_log_is_a_moment():
     assert trace.idle == ()
 
 
+@pytest.mark.slow
 def test_ten_thousand_drags_are_quick():
     way = [at(0.001 * step) for step in range(20)]
     events = [Entry(0.0, "opened"), *(drag(2.0 * i, 1.0, *way) for i in range(1, 10_001))]

@@ -18,6 +18,8 @@ from app.storage.database import Database
 from tests.app.waiting import LONGEST, wait_until
 from tests.processes import command_line, descendants, environment, run_snap6d
 
+pytestmark = pytest.mark.slow  # a command with workers, killed and run again
+
 STUDY = "try"
 
 
