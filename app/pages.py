@@ -1,10 +1,13 @@
-"""The pages: static files, and the headers that keep them to themselves."""
+"""The pages: templates, their static files, and the headers that keep them to themselves."""
 
+from functools import cache
+from pathlib import Path
 from urllib.parse import quote
 
 from fastapi import APIRouter, FastAPI, HTTPException, Request
-from fastapi.responses import FileResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.middleware.base import RequestResponseEndpoint
 
 from app.api.dependencies import get_services, identify
@@ -14,6 +17,8 @@ from app.storage.roles import Role
 from app.storage.tables import Base, Object, Registration, Study, Task
 
 STATIC = PROJECT / "static"
+TEMPLATES = Path(__file__).parent / "templates"
+"""A file a page; what pages share, and parts of large ones, lie in folders."""
 CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; frame-src 'self'; frame-ancestors 'self'; "
     "base-uri 'none'; form-action 'self'"
@@ -40,16 +45,29 @@ def install(app: FastAPI) -> None:
     app.middleware("http")(_add_headers)
 
 
+@cache
+def html_of(page: str) -> str:
+    """A page of the name of its template: nothing in it depends on who asks."""
+    templates = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return templates.get_template(f"{page}.html").render()
+
+
 @router.get("/participate")
-def participate_page() -> FileResponse:
+def participate_page() -> HTMLResponse:
     """A participant's door into a study: their link leads here."""
-    return FileResponse(STATIC / "participate.html")
+    return HTMLResponse(html_of("participate"))
 
 
 @router.get("/sign-in")
-def sign_in_page() -> FileResponse:
+def sign_in_page() -> HTMLResponse:
     """Signing in, by password or one-time link."""
-    return FileResponse(STATIC / "sign-in.html")
+    return HTMLResponse(html_of("sign-in"))
 
 
 @router.get("/")
@@ -71,7 +89,7 @@ def page(request: Request) -> Response:
         return RedirectResponse("/participate", 303)
     if about and not _exists(request, name, about[0]):
         raise HTTPException(404, f"There is nothing at {request.url.path}: no {name} page is about it.")
-    return FileResponse(STATIC / f"{name or 'home'}.html")
+    return HTMLResponse(html_of(name or "home"))
 
 
 def _exists(request: Request, name: str, about: str) -> bool:
@@ -87,7 +105,7 @@ def _missing(request: Request, error: Exception) -> Response:
     """For a browser a page that leads home, for programs the problem."""
     asks_for_page = "text/html" in request.headers.get("accept", "")
     if asks_for_page and not request.url.path.startswith(NOT_FOR_PEOPLE):
-        return FileResponse(STATIC / "missing.html", 404)
+        return HTMLResponse(html_of("missing"), 404)
     return http_error(request, error)
 
 

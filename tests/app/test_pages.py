@@ -7,11 +7,11 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from app.pages import CONTENT_SECURITY_POLICY, STATIC
+from app.pages import CONTENT_SECURITY_POLICY, STATIC, TEMPLATES, html_of
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 
-PAGES = sorted(STATIC.glob("*.html"))
+PAGES = sorted(path.stem for path in TEMPLATES.glob("*.html"))
 SHARED = STATIC / "shared"
 FILES = sorted(path for path in STATIC.rglob("*") if path.is_file())
 SVG_NAMESPACE = "http://www.w3.org/2000/svg"
@@ -90,7 +90,16 @@ def test_after_signing_out_the_pages_are_closed(live: LiveServer) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", ["/label", "/label/", "/label/1/2", "/home.html", "/static/", "/static/..%2fpyproject.toml"]
+    "path",
+    [
+        "/label",
+        "/label/",
+        "/label/1/2",
+        "/home.html",
+        "/static/home.html",
+        "/static/",
+        "/static/..%2fpyproject.toml",
+    ],
 )
 def test_there_is_no_other_page(live: LiveServer, path: str) -> None:
     sentence(live.person("a reader of pages").get(path), 404)
@@ -172,9 +181,21 @@ def test_the_view_may_stand_in_our_page_and_pictures_may_be_kept(live: LiveServe
 # -- what the pages are made of
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_a_page_has_no_script_or_style_of_its_own(page) -> None:
-    parsed = Tags(page.read_text())
+def test_no_half_made_page_lies_among_the_files() -> None:
+    assert [file for file in FILES if file.suffix == ".html"] == []
+    assert not TEMPLATES.is_relative_to(STATIC)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_stands_in_the_shell(page: str) -> None:
+    tags = [tag for tag, _ in Tags(html_of(page)).tags]
+    assert [tags.count(tag) for tag in ("html", "head", "title", "body", "main")] == [1] * 5
+    assert html_of(page).startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_page_has_no_script_or_style_of_its_own(page: str) -> None:
+    parsed = Tags(html_of(page))
     assert parsed.inline.strip() == ""
     assert "style" not in {tag for tag, _ in parsed.tags}
     for tag, attributes in parsed.tags:
@@ -186,9 +207,9 @@ def test_a_page_has_no_script_or_style_of_its_own(page) -> None:
             assert attributes["type"] == "module" and (attributes["src"] or "").startswith("/static/")
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_all_that_a_page_names_is_there(live: LiveServer, page) -> None:
-    parsed = Tags(page.read_text())
+@pytest.mark.parametrize("page", PAGES)
+def test_all_that_a_page_names_is_there(live: LiveServer, page: str) -> None:
+    parsed = Tags(html_of(page))
     assert len(parsed.ids) == len(set(parsed.ids))
     client: httpx.Client = live.person("a reader of pages")
     named = {
@@ -210,7 +231,7 @@ def test_all_that_a_page_names_is_there(live: LiveServer, page) -> None:
                 assert target in parsed.ids, (tag, name, target)
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(STATIC)))
+@pytest.mark.parametrize("file", FILES + sorted(TEMPLATES.rglob("*.html")), ids=lambda file: file.name)
 def test_no_file_names_another_host(file) -> None:
     content = file.read_text().replace(SVG_NAMESPACE, "")
     assert not re.findall(r"(?:https?|wss?):?//[^\s\"'`]*", content)
