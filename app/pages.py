@@ -7,7 +7,6 @@ from urllib.parse import quote
 from fastapi import APIRouter, FastAPI, HTTPException, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.middleware.base import RequestResponseEndpoint
 
 from app.api.dependencies import get_services, identify
@@ -15,6 +14,7 @@ from app.api.problems import http_error
 from app.config import PROJECT
 from app.storage.roles import Role
 from app.storage.tables import Base, Object, Registration, Study, Task
+from app.templating import templates_in
 
 STATIC = PROJECT / "static"
 TEMPLATES = Path(__file__).parent / "templates"
@@ -48,14 +48,7 @@ def install(app: FastAPI) -> None:
 @cache
 def html_of(page: str) -> str:
     """A page of the name of its template: nothing in it depends on who asks."""
-    templates = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return templates.get_template(f"{page}.html").render()
+    return templates_in(TEMPLATES).get_template(f"{page}.html").render()
 
 
 @router.get("/participate")

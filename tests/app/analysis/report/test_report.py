@@ -142,8 +142,8 @@ def test_both_methods_stand_side_by_side_in_figure_page_and_tables():
     words = " ".join(ET.fromstring(file_of(both, "figure.svg").decode()).itertext())
     assert "STG, accurate" in words and "STG, paper's filter, accurate" in words
     html = file_of(both, "report.html").decode()
-    assert "charged with 0.1 s, by the paper&#x27;s filter with 7 s" in html
-    assert "from the same poses, by the paper&#x27;s filter" in html
+    assert "charged with 0.1 s, by the paper&#39;s filter with 7 s" in html
+    assert "from the same poses, by the paper&#39;s filter" in html
     for name in ("curves", "hand_off", "gains"):
         rows = list(csv.DictReader(io.StringIO(file_of(both, f"{name}.csv").decode())))
         assert {row["method"] for row in rows} >= {"default"}
