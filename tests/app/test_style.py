@@ -1,10 +1,17 @@
-"""The colours of the style sheet: text can be read on what it stands on, in light and dark."""
+"""The style sheets: short, of one set of sizes and colours, whose text can be read in light and dark."""
 
 import re
 
 import pytest
 
 from app.pages import STATIC
+
+TOKENS = STATIC / "style" / "tokens.css"
+SHEETS = sorted(STATIC.rglob("*.css"))
+LONGEST_SHEET = 300
+COLOR = r"#[0-9a-fA-F]{3,8}\b(?=[^{]*;)|\b(?:rgb|hsl)a?\("
+SIZE = r"font-size: *[\d.]+\w+|font: *[\d.]+\w+|radius: *[^;]*\d(?:px|rem)"
+"""A size of text or of a corner that is no token; shares of what stands around it may be."""
 
 LEAST_FOR_TEXT = 4.5
 LEAST_FOR_SHAPES = 3.0
@@ -17,6 +24,9 @@ TEXT = [
     *(("on-fill", f"{who}-fill{hover}") for who in ("machine", "human") for hover in ("", "-hover")),
     ("ink", "problem-soft"),
     ("problem", "problem-soft"),
+    *((text, "view-ground") for text in ("view-ink", "view-soft", "view-muted")),
+    ("view-ink", "view-sunken"),
+    ("view-ground", "view-ink"),
 ]
 SHAPES = [
     (shape, ground) for shape in ("line-strong", "machine", "human") for ground in ("surface", "ground")
@@ -25,8 +35,7 @@ SHAPES = [
 
 def variables() -> dict[str, dict[str, str]]:
     """Colours by scheme and name; what dark does not say is as in light."""
-    sheet = (STATIC / "style.css").read_text()
-    blocks = re.findall(r":root\s*{(.*?)}", sheet, re.DOTALL)
+    blocks = re.findall(r":root\s*{(.*?)}", TOKENS.read_text(), re.DOTALL)
     light, dark = (dict(re.findall(r"--([\w-]+):\s*(#[0-9a-f]{6});", block)) for block in blocks)
     return {"light": light, "dark": light | dark}
 
@@ -54,3 +63,22 @@ def test_text_can_be_read_and_shapes_can_be_seen(scheme):
     for pairs, least in ((TEXT, LEAST_FOR_TEXT), (SHAPES, LEAST_FOR_SHAPES)):
         found = {pair: contrast(*(colors[name] for name in pair)) for pair in pairs}
         assert {pair: value for pair, value in found.items() if value < least} == {}
+
+
+@pytest.mark.parametrize("sheet", SHEETS, ids=lambda sheet: str(sheet.relative_to(STATIC)))
+def test_a_sheet_is_short_and_names_no_colour_or_size_of_its_own(sheet):
+    content = sheet.read_text()
+    assert len(content.splitlines()) < LONGEST_SHEET
+    if sheet != TOKENS:
+        assert re.findall(f"{COLOR}|{SIZE}", content) == []
+
+
+def test_every_token_is_used_and_every_variable_is_there():
+    content = "".join(path.read_text() for path in [*SHEETS, *STATIC.rglob("*.js")])
+    said = set(re.findall(r"(--[\w-]+):", content))
+    tokens = set(re.findall(r"(--[\w-]+):", TOKENS.read_text()))
+    asked = set(re.findall(r"var\((--[\w-]+)", content))
+    set_by_scripts = set(re.findall(r"""setProperty\(["'](--[\w-]+)""", content))
+    read_by_scripts = set(re.findall(r"""["'](--[\w-]+)["']""", content)) - set_by_scripts
+    assert asked <= said | set_by_scripts
+    assert tokens <= asked | read_by_scripts
