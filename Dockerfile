@@ -16,14 +16,14 @@ WORKDIR /opt/snap6d
 
 # the packages first, in a layer that a change of the code leaves as it is
 COPY pyproject.toml constraints.txt ./
-RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies'], sep='\n')" \
-        > /tmp/requirements.txt \
+RUN python -c "import tomllib; project = tomllib.load(open('pyproject.toml', 'rb'))['project']; \
+print(*project['dependencies'], *project['optional-dependencies']['app'], sep='\n')" > /tmp/requirements.txt \
     && pip install --no-cache-dir --constraint constraints.txt setuptools \
     && pip install --no-cache-dir --use-pep517 --no-build-isolation --constraint constraints.txt \
         --requirement /tmp/requirements.txt \
     && rm /tmp/requirements.txt
 
-COPY README.md LICENSE ./
+COPY setup.py README.md LICENSE ./
 COPY registration_core registration_core
 COPY app app
 COPY migrations migrations

@@ -3,17 +3,22 @@
 from pathlib import Path
 from typing import Annotated
 
+from platformdirs import user_data_path
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-PROJECT = Path(__file__).resolve().parents[1]
-"""Where `static`, `migrations` and `scenes` lie."""
+from app.resources import CHECKOUT
 
 RISK = 0.05
 """Share of wrong poses among those that the machine may accept by their confidence; certificates are asked
 for besides. The calibration that comes with the package bears out no less; one of a dataset's own may."""
 LEAST_RISK = 0.0001
 """The least that can be asked for: one in ten thousand."""
+
+
+def usual_state_dir() -> Path:
+    """`state` in a checkout; for an installed Snap6D, a folder of whoever runs it."""
+    return CHECKOUT / "state" if CHECKOUT else user_data_path("snap6d", appauthor=False)
 
 
 class Settings(BaseSettings):
@@ -25,7 +30,7 @@ class Settings(BaseSettings):
     """Address that the one public port listens on."""
     port: Annotated[int, Field(ge=0, le=65535)] = 8000
     """The public port; 0 takes a free one."""
-    state_dir: Path = PROJECT / "state"
+    state_dir: Path = Field(default_factory=usual_state_dir)
     """Database, stored files and exports."""
     database_url: str = ""
     """SQLAlchemy address of another database; empty: SQLite in `state_dir`."""

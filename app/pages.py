@@ -1,24 +1,26 @@
 """The pages: templates, their static files, and the headers that keep them to themselves."""
 
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
 from fastapi import APIRouter, FastAPI, HTTPException, Request
-from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.base import RequestResponseEndpoint
 
 from app.api.dependencies import get_services, identify
 from app.api.problems import http_error
-from app.config import PROJECT
+from app.resources import STATIC
 from app.storage.roles import Role
 from app.storage.tables import Base, Object, Registration, Study, Task
 from app.templating import templates_in
 
-STATIC = PROJECT / "static"
 TEMPLATES = Path(__file__).parent / "templates"
 """A file a page; what pages share, and parts of large ones, lie in folders."""
+SWAGGER = Path(str(files("fastapi_swagger") / "resources"))
+"""Script and style of Swagger UI; the package's own code is not used."""
 CONTENT_SECURITY_POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; frame-src 'self'; frame-ancestors 'self'; "
     "base-uri 'none'; form-action 'self'"
@@ -40,6 +42,7 @@ router = APIRouter(include_in_schema=False)
 def install(app: FastAPI) -> None:
     """Serve the pages and their files."""
     app.include_router(router)
+    app.mount("/static/swagger", StaticFiles(directory=SWAGGER), name="swagger")
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     app.add_exception_handler(404, _missing)
     app.middleware("http")(_add_headers)
@@ -61,6 +64,12 @@ def participate_page() -> HTMLResponse:
 def sign_in_page() -> HTMLResponse:
     """Signing in, by password or one-time link."""
     return HTMLResponse(html_of("sign-in"))
+
+
+@router.get("/api/docs")
+def rest_page() -> FileResponse:
+    """REST, to read and to try out; like the description that it shows, it is open to all."""
+    return FileResponse(STATIC / "rest.html")
 
 
 @router.get("/")

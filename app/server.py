@@ -9,9 +9,10 @@ import uvicorn
 from sqlalchemy import select
 
 from app.access.auth import LOCAL_ADMINISTRATOR
-from app.config import PROJECT, Settings
+from app.config import Settings
 from app.datasets.importing import import_dataset
 from app.main import create_app, create_services
+from app.resources import DEMO_SCENES
 from app.services import Services
 from app.serving.connections import server_config
 from app.serving.listening import ServeError, sign_in_link
@@ -22,7 +23,6 @@ from app.storage.roles import Role
 from app.storage.tables import Dataset
 from app.workers.pool import Snapper
 
-DEMO_SCENES = PROJECT / "scenes" / "demo"
 SECONDS_TO_FINISH = 3
 
 
@@ -39,7 +39,7 @@ def run(
         settings: What to serve with.
         listener: Where to serve.
         snapper: The workers, which may still be starting.
-        prepare: Update the database, and import the demo scenes where it is empty, before.
+        prepare: Update the database before; one that is new is made in any case, with the demo scenes.
         say: Tells the person at the console.
 
     Raises:
@@ -48,7 +48,7 @@ def run(
     """
     keep_large_blocks_apart()
     rich.reconfigure(quiet=True)  # or viser announces the private address of every view
-    if prepare:
+    if prepare or _is_new(settings):
         prepare_state(settings, say)
     services = create_services(settings, snapper)
     config = server_config(
@@ -81,6 +81,14 @@ def prepare_state(settings: Settings, say: Callable[[str], None]) -> None:
         if is_empty and DEMO_SCENES.is_dir():
             summary = import_dataset(database, FileStore(settings.files_dir), DEMO_SCENES)
             say(f"Imported the demo scenes: {summary.tasks} tasks.")
+    finally:
+        database.close()
+
+
+def _is_new(settings: Settings) -> bool:
+    database = Database(settings.resolved_database_url)
+    try:
+        return database.is_new()
     finally:
         database.close()
 

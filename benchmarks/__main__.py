@@ -11,8 +11,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from app.config import PROJECT
 from benchmarks import (
+    PROJECT,
     ablation,
     big_mesh,
     browser,

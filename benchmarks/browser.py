@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from playwright.async_api import Page, async_playwright
 
+from app.resources import DEMO_SCENES
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, server_on
+from benchmarks.server import RunningServer, server_on
 from benchmarks.viser_client import ViewClient
 from registration_core.geometry import pose
 from tests.e2e.conftest import CHROMIUM, CHROMIUM_ARGUMENTS, SHOWN_AROUND

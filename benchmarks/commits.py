@@ -9,13 +9,14 @@ import numpy as np
 from sqlalchemy import func, select
 
 from app.access.auth import Auth
+from app.resources import DEMO_SCENES
 from app.storage.database import Database
 from app.storage.event_log import EventLog, NewEvent
 from app.storage.roles import Actor, Role
 from app.storage.tables import Event, Registration
 from benchmarks.figures import Figure, Target
 from benchmarks.scenes import known_tasks
-from benchmarks.server import DEMO_SCENES, database_of, prepare_state
+from benchmarks.server import database_of, prepare_state
 
 TITLE = "The log: durable drag events a second (a path of 60 rows each, synced to the disk one by one)"
 TARGET = Target(500.0, at_least=True)

@@ -16,12 +16,13 @@ from sqlalchemy.orm import Session
 
 from app.access.auth import Auth
 from app.analysis.report.report import study_report
+from app.resources import DEMO_SCENES
 from app.storage.database import Database
 from app.storage.roles import Role
 from app.storage.tables import Event, Participant, Registration, Study, Task, Trial, User, utc_now
 from benchmarks.figures import Figure, Target
 from benchmarks.scenes import known_tasks
-from benchmarks.server import DEMO_SCENES, database_of, prepare_state
+from benchmarks.server import database_of, prepare_state
 from registration_core.geometry import pose
 
 Array = NDArray[np.float64]

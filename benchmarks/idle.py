@@ -5,8 +5,9 @@ from pathlib import Path
 
 import psutil
 
+from app.resources import DEMO_SCENES
 from benchmarks.figures import Figure, Target
-from benchmarks.server import DEMO_SCENES, RunningServer, server_on
+from benchmarks.server import RunningServer, server_on
 
 TITLE = "A server that nobody uses: share of a core that it takes"
 TARGET = Target(2.0)

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from app.resources import DEMO_SCENES
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.operators import Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, server_on
+from benchmarks.server import RunningServer, server_on
 from benchmarks.viser_client import Array, ViewClient
 from registration_core.geometry import pose
 

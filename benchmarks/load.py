@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.resources import DEMO_SCENES
 from benchmarks.bookkeeping import Comparison, Finished, compare_all
 from benchmarks.figures import Figure, Target, spread
 from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, database_of, server_on
+from benchmarks.server import RunningServer, database_of, server_on
 from benchmarks.viser_client import ViewClient
 from registration_core.geometry import pose
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from sqlalchemy import select
 
+from app.resources import DEMO_SCENES
 from app.storage.tables import Frame, Object, Registration, Scene, Task, User
 from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
-from benchmarks.server import DEMO_SCENES, RunningServer, database_of, server_on
+from benchmarks.server import RunningServer, database_of, server_on
 
 TITLE = "The home page of 10,000 tasks"
 TARGET = Target(1.0)

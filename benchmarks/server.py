@@ -15,14 +15,14 @@ import httpx
 import psutil
 
 from app.access.auth import Auth
-from app.config import PROJECT, Settings
+from app.config import Settings
 from app.datasets.importing import import_dataset
 from app.storage.database import Database
 from app.storage.files import FileStore
 from app.storage.roles import Role
+from benchmarks import PROJECT
 
 SERVE = (sys.executable, "-m", "app.cli.commands", "serve")
-DEMO_SCENES = PROJECT / "scenes" / "demo"
 SECONDS_TO_START = 180.0
 SECONDS_TO_STOP = 30.0
 SECONDS_BETWEEN_TRIES = 0.02

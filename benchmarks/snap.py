@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from app.resources import DEMO_SCENES
 from benchmarks.figures import Figure, Target, percentile, spread
 from benchmarks.operators import Operator, Stream, signed_in_operators
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, server_on
+from benchmarks.server import RunningServer, server_on
 from registration_core.geometry import pose_error
 
 TITLE = "Snap on the demo scenes: from POST .../snaps to the result on the stream"

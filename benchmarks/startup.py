@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from app.config import PROJECT
+from benchmarks import PROJECT
 from benchmarks.figures import Figure, Target, percentile
 from benchmarks.server import SERVE, running_server
 

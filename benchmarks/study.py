@@ -13,10 +13,11 @@ from pathlib import Path
 
 import psutil
 
-from app.config import PROJECT
+from app.resources import DEMO_SCENES
+from benchmarks import PROJECT
 from benchmarks.figures import Figure, Target
 from benchmarks.registration.objects import DATA
-from benchmarks.server import DEMO_SCENES, prepare_state
+from benchmarks.server import prepare_state
 
 TITLE = (
     "A simulated study on 2 demo and 2 real scenes, quickly and accurately, by hand; snaps offline; report"

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.resources import DEMO_SCENES
 from benchmarks.aligning import TECHNIQUES, Alignment
 from benchmarks.figures import Figure, Target
 from benchmarks.operators import Operator, signed_in_operators
 from benchmarks.registration.objects import DATA, ycb_object
 from benchmarks.scenes import KnownTask, known_tasks
-from benchmarks.server import DEMO_SCENES, RunningServer, server_on
+from benchmarks.server import RunningServer, server_on
 from registration_core.geometry import pose
 
 TITLE = "Aligning an object within 5 mm and 5°, from 20 cm and 45° off: a scripted operator"

@@ -14,10 +14,11 @@ from pathlib import Path
 import psutil
 
 from app.access.auth import Auth
-from app.config import PROJECT, Settings
+from app.config import Settings
 from app.storage.database import Database
 from app.storage.roles import Role
 from tests.app.waiting import LONGEST
+from tests.conftest import REPOSITORY
 
 Command = Callable[..., subprocess.CompletedProcess[str]]
 """Runs `snap6d` on a state directory with arguments, and with settings as keywords."""
@@ -36,7 +37,7 @@ def run_snap6d(
     return subprocess.run(
         [sys.executable, "-m", "app.cli.commands", *arguments],
         env=environment(state_dir) | variables,
-        cwd=PROJECT,
+        cwd=REPOSITORY,
         input=typed,
         capture_output=True,
         text=True,
@@ -110,11 +111,16 @@ def start_server(state_dir: Path, *arguments: str) -> Server:
     process = subprocess.Popen(
         [sys.executable, "-m", "app.cli.commands", "serve", "--port", "0", *arguments],
         env=environment(state_dir),
-        cwd=PROJECT,
+        cwd=REPOSITORY,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
     )
+    return started(process, state_dir)
+
+
+def started(process: subprocess.Popen[str], state_dir: Path) -> Server:
+    """Wait until a server tells its sign-in link."""
     assert process.stdout is not None
     printed = ""
     for line in process.stdout:

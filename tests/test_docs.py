@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 import app
 from tests.conftest import REPOSITORY
@@ -65,9 +66,11 @@ def test_examples_import_what_there_is(page):
 
 def test_the_version_is_the_same_wherever_it_is_told():
     version = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]["version"]
-    released = re.findall(r"^## \[(\d[\d.]*)\]", (REPOSITORY / "CHANGELOG.md").read_text(), re.MULTILINE)
-    cited = re.findall(r"^version: (.*)$", (REPOSITORY / "CITATION.cff").read_text(), re.MULTILINE)
-    assert [version] == released[:1] == cited == [app.__version__]
+    changes = (REPOSITORY / "CHANGELOG.md").read_text()
+    released, date = re.findall(r"^## \[(\d[\d.]*)\] - (.*)$", changes, re.MULTILINE)[0]
+    cited = yaml.safe_load((REPOSITORY / "CITATION.cff").read_text())
+    assert version == released == cited["version"] == app.__version__
+    assert date == str(cited["date-released"])
 
 
 def test_the_rules_find_what_is_wrong(tmp_path):

@@ -44,9 +44,7 @@ def serve(
     database_url: Annotated[str | None, typer.Option(help="Another database, such as PostgreSQL.")] = None,
     scheduler_address: Annotated[str | None, typer.Option(help="A Dask scheduler to use.")] = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes to start here.")] = None,
-    prepare: Annotated[
-        bool, typer.Option("--prepare", help="Update the database and import the demo scenes first.")
-    ] = False,
+    prepare: Annotated[bool, typer.Option("--prepare", help="Update an older database first.")] = False,
 ) -> None:
     """Start Snap6D and print a link to sign in with."""
     from app.serving.listening import listen

@@ -14,7 +14,7 @@ from sqlalchemy.engine import make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError
 from sqlalchemy.orm import Session
 
-from app.config import PROJECT
+from app.resources import MIGRATIONS
 from app.storage.faults import advice
 
 BUSY_TIMEOUT_SECONDS = 20
@@ -62,13 +62,13 @@ class Database:
         with self._write_lock, Session(engine, expire_on_commit=False) as session, session.begin():
             yield session
 
+    def is_new(self) -> bool:
+        """Whether it holds no tables yet."""
+        return self._revision() is None
+
     def check_version(self) -> None:
         """Raise `DatabaseError` unless the tables are those of this version."""
-        try:
-            with self.engine.connect() as connection:
-                found = MigrationContext.configure(connection).get_current_revision()
-        except DBAPIError as error:
-            raise DatabaseError(f"the database cannot be opened: {advice(error) or error.orig}") from error
+        found = self._revision()
         wanted = ScriptDirectory.from_config(_alembic_config()).get_current_head()
         if found == wanted:
             return
@@ -81,6 +81,13 @@ class Database:
         raise DatabaseError(
             f"the database is of an older Snap6D (revision {found}); run `snap6d migrate` to update it"
         )
+
+    def _revision(self) -> str | None:
+        try:
+            with self.engine.connect() as connection:
+                return MigrationContext.configure(connection).get_current_revision()
+        except DBAPIError as error:
+            raise DatabaseError(f"the database cannot be opened: {advice(error) or error.orig}") from error
 
     def migrate(self) -> None:
         """Bring the tables up to this version; nothing happens where they are."""
@@ -146,7 +153,7 @@ class Database:
 
 def _alembic_config() -> Config:
     config = Config()
-    config.set_main_option("script_location", str(PROJECT / "migrations"))
+    config.set_main_option("script_location", str(MIGRATIONS))
     return config
 
 

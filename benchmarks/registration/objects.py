@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from app.config import PROJECT
+from benchmarks import PROJECT
 from registration_core import ObjectModel, Symmetries
 from registration_core.geometry import pose
 from registration_core.geometry.object_model import ContinuousSymmetry, discrete

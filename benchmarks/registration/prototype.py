@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from app.config import PROJECT
+from benchmarks import PROJECT
 from benchmarks.registration.instances import Instance
 from registration_core import ObjectModel
 from registration_core.geometry import pose

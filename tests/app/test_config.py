@@ -3,15 +3,26 @@
 import pytest
 from pydantic import ValidationError
 
-from app.config import PROJECT, Settings
+import app.config
+from app.config import Settings
+from tests.conftest import REPOSITORY
 
 
 def test_everything_has_a_default(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # no .env here
     settings = Settings()
     assert (settings.host, settings.port, settings.workers) == ("127.0.0.1", 8000, 2)
-    assert settings.state_dir == PROJECT / "state"
+    assert settings.state_dir == REPOSITORY / "state"
     assert settings.scheduler_address == settings.database_url == settings.public_url == ""
+
+
+def test_an_installed_snap6d_keeps_its_state_in_a_folder_of_whoever_runs_it(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(app.config, "CHECKOUT", None)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    assert Settings().state_dir == tmp_path / "data" / "snap6d"
+    monkeypatch.setenv("SNAP6D_STATE_DIR", str(tmp_path / "told"))
+    assert Settings().state_dir == tmp_path / "told"
 
 
 def test_the_environment_changes_it_and_arguments_go_before(monkeypatch, tmp_path):

@@ -7,7 +7,8 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from app.pages import CONTENT_SECURITY_POLICY, STATIC, TEMPLATES, html_of
+from app.pages import CONTENT_SECURITY_POLICY, TEMPLATES, html_of
+from app.resources import STATIC
 from tests.app.live import LiveServer
 from tests.app.rest import begin, sentence
 
@@ -83,6 +84,11 @@ def test_who_is_signed_in_gets_the_page(live: LiveServer, path: str, title: str)
     assert found is not None and title in found[1]
 
 
+def test_rest_can_be_read_by_all_like_its_description(live: LiveServer) -> None:
+    for address in ("/api/docs", "/api/openapi.json", "/static/swagger/swagger-ui-bundle.js"):
+        assert live.stranger().get(address).status_code == 200
+
+
 def test_after_signing_out_the_pages_are_closed(live: LiveServer) -> None:
     person = live.person("somebody who leaves")
     person.post("/api/sign-out")
@@ -139,7 +145,7 @@ def test_what_is_for_programs_answers_them_in_a_browser_too(live: LiveServer, pa
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/sign-in", "/export", "/label/1", "/api/health", "/api/me", "/nothing"]
+    "path", ["/", "/sign-in", "/export", "/label/1", "/api/docs", "/api/health", "/api/me", "/nothing"]
 )
 @pytest.mark.parametrize("signed_in", [False, True])
 def test_pages_and_answers_keep_to_themselves(live: LiveServer, path: str, signed_in: bool) -> None:

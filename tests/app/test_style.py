@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from app.pages import STATIC
+from app.resources import STATIC
 
 TOKENS = STATIC / "style" / "tokens.css"
 SHEETS = sorted(STATIC.rglob("*.css"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.config import PROJECT
+from app.resources import DEMO_SCENES
 from registration_core.bop.dataset import read_dataset
 from tests.e2e.conftest import take_picture
 from tests.e2e.gizmo import view_frame, wait_for_picture
@@ -21,7 +21,7 @@ HAS_NODE = "([name, wanted]) => Boolean(window.__viserMutable.nodeRefFromName[na
 
 def true_poses() -> dict[str, np.ndarray]:
     """T_world_object (4, 4) of the objects of the first demo scene, by name."""
-    dataset = read_dataset(PROJECT / "scenes/demo")
+    dataset = read_dataset(DEMO_SCENES)
     names = {known.obj_id: known.name for known in dataset.objects}
     image = dataset.scenes[0].images[0]
     assert image.T_world_camera is not None

@@ -138,7 +138,6 @@ def test_an_empty_database_is_said(snap6d, tmp_path):
     message = "the database is empty; run `snap6d migrate` first"
     for command in (["import", "."], ["export", "x", "y"], ["token", "create", "x"], ["user", "add", "x"]):
         assert failure(snap6d(tmp_path, *command)) == message
-    assert failure(run_snap6d(tmp_path, "serve", "--port", "0")) == message
 
 
 @pytest.mark.slow

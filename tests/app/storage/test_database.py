@@ -13,15 +13,16 @@ from sqlalchemy import delete, func, select, text, update
 from sqlalchemy.exc import DBAPIError, IntegrityError
 
 import app.storage.database
-from app.config import PROJECT
 from app.datasets.importing import import_dataset
+from app.resources import MIGRATIONS
 from app.storage.database import Database, DatabaseError
 from app.storage.event_log import EventLog, NewEvent
 from app.storage.files import FileStore
 from app.storage.roles import Actor
 from app.storage.tables import Base, Dataset, EstimateRow, Event, Registration, Task, User
+from tests.conftest import REPOSITORY
 
-HEAD = ScriptDirectory(str(PROJECT / "migrations")).get_current_head()
+HEAD = ScriptDirectory(str(MIGRATIONS)).get_current_head()
 """The revision of this version's tables."""
 
 LATER_REVISION = '''
@@ -95,7 +96,7 @@ with database.write() as session:
     session.flush()
     os.kill(os.getpid(), signal.SIGKILL)
 """
-    done = subprocess.run([sys.executable, "-c", code], cwd=PROJECT, capture_output=True, check=False)
+    done = subprocess.run([sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, check=False)
     assert done.returncode == -9, done.stderr
     database = Database(f"sqlite:///{tmp_path / 'x.sqlite'}")
     with database.read() as session:
@@ -221,9 +222,9 @@ def test_the_log_can_only_grow(database, registration_id, table, column):
 def later_revision(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """This version becomes one that has another migration; its folder."""
     project = tmp_path / "project"
-    shutil.copytree(PROJECT / "migrations", project / "migrations")
+    shutil.copytree(MIGRATIONS, project / "migrations")
     (project / "migrations/versions/later.py").write_text(LATER_REVISION.format(head=HEAD))
-    monkeypatch.setattr(app.storage.database, "PROJECT", project)
+    monkeypatch.setattr(app.storage.database, "MIGRATIONS", project / "migrations")
     return project
 
 
@@ -256,11 +257,11 @@ def test_an_older_database_says_what_to_do_and_can_be_updated(database, later_re
 def first_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Database:
     """A database as the first version left it: with an estimate made before anyone told a spread."""
     project = tmp_path / "first"
-    shutil.copytree(PROJECT / "migrations", project / "migrations")
+    shutil.copytree(MIGRATIONS, project / "migrations")
     for later in sorted((project / "migrations/versions").glob("0*.py"))[1:]:
         later.unlink()
     with monkeypatch.context() as patch:
-        patch.setattr(app.storage.database, "PROJECT", project)
+        patch.setattr(app.storage.database, "MIGRATIONS", project / "migrations")
         database = Database(f"sqlite:///{tmp_path / 'first.sqlite'}")
         database.migrate()
     with sqlite3.connect(path_of(database)) as connection:  # which does not check references

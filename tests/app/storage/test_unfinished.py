@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from app.config import PROJECT
 from app.storage.unfinished import clear_unfinished, unfinished
+from tests.conftest import REPOSITORY
 
 AT_WORK = """
 import sys
@@ -36,7 +36,7 @@ def test_what_a_killed_process_left_is_cleared_and_what_a_living_one_needs_is_no
     (tmp_path / "kept").write_bytes(b"kept")
     command = [sys.executable, "-c", AT_WORK, str(tmp_path)]
     with subprocess.Popen(
-        command, cwd=PROJECT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        command, cwd=REPOSITORY, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None and process.stdout.readline() == "at work\n"
         clear_unfinished(tmp_path, tmp_path / "not there")

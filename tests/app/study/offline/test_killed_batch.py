@@ -13,9 +13,10 @@ import pytest
 
 from app.analysis.report.report import study_report
 from app.analysis.report.report_files import write_report
-from app.config import PROJECT, Settings
+from app.config import Settings
 from app.storage.database import Database
 from tests.app.waiting import LONGEST, wait_until
+from tests.conftest import REPOSITORY
 from tests.processes import command_line, descendants, environment, run_snap6d
 
 pytestmark = pytest.mark.slow  # a command with workers, killed and run again
@@ -64,7 +65,7 @@ def kill_half_way(state: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "app.cli.commands", "study", "snap", STUDY],
         env=environment(state),
-        cwd=PROJECT,
+        cwd=REPOSITORY,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
