@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import cached_property
 
 from pwdlib import PasswordHash
 from sqlalchemy import delete, select
@@ -58,7 +59,6 @@ class Auth:
     def __init__(self, database: Database, throttle: Throttle | None = None) -> None:
         self._database = database
         self._passwords = PasswordHash.recommended()
-        self._unknown_user_hash = self._passwords.hash(secrets.token_urlsafe())
         self._throttle = throttle or Throttle()
         self._checks = _PasswordChecks()
 
@@ -187,8 +187,14 @@ class Auth:
         with self._database.read() as session:
             user = _find_user(session, name)
         kept = user.password_hash if user is not None else None
-        is_right = self._passwords.verify(password, kept or self._unknown_user_hash)
+        nobodys = self._nobodys_hash  # made in the first attempt, whoever it is of
+        is_right = self._passwords.verify(password, kept or nobodys)
         return user if is_right and kept else None
+
+    @cached_property
+    def _nobodys_hash(self) -> str:
+        """Of a password that nobody has; most commands check none, and it takes a quarter of a second."""
+        return self._passwords.hash(secrets.token_urlsafe())
 
     def _identify(self, kind: str, secret: str, actor: Actor) -> Identity | None:
         with self._database.read() as session:

@@ -49,7 +49,6 @@ def serve(
     """Start Snap6D and print a link to sign in with."""
     from app.serving.listening import listen
     from app.serving.state_lock import held
-    from app.workers.pool import create_snapper
 
     given = {
         "host": host,
@@ -62,6 +61,10 @@ def serve(
     settings = read_settings(**given)
     listener = listen(settings)
     with held(settings.state_dir, settings.host, listener.getsockname()[1]):
+        if not prepare:
+            checked_database(settings).close()  # or it would be said when all else has started
+        from app.workers.pool import create_snapper
+
         snapper = create_snapper(settings)
         try:
             from app import server  # its imports take seconds, in which the workers start

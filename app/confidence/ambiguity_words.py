@@ -5,7 +5,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import norm
+from scipy.special import ndtri  # that of `scipy.stats`, whose import takes half a second
 
 Array = NDArray[np.float64]
 Kind = Literal["other mode", "free motion"]
@@ -13,7 +13,7 @@ Motion = Literal["turn", "shift"]
 
 SHARE = 0.95
 """Of the belief that lies within what is told."""
-REACH_ALONG = float(norm.ppf(0.5 + SHARE / 2.0))
+REACH_ALONG = float(ndtri(0.5 + SHARE / 2.0))
 """Standard deviations, along one axis."""
 ANY_TURN = np.radians(120.0)
 """A free turn that reaches so far to either side may as well be any."""

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
@@ -222,6 +221,8 @@ def _auroc(confidences: Array, right: NDArray[np.bool_]) -> float | None:
     good, bad = int(right.sum()), int((~right).sum())
     if good == 0 or bad == 0:
         return None
+    from scipy.stats import rankdata  # heavy, and needed only where a dataset is calibrated
+
     return float((rankdata(confidences)[right].sum() - good * (good + 1) / 2) / (good * bad))
 
 

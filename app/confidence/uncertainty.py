@@ -5,15 +5,15 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from app.confidence.ambiguity_words import SHARE, Kind, Motion, axis_name, reach
 from app.storage.tables import Pose
 
 Array = NDArray[np.float64]
 
-REACH = float(np.sqrt(chi2.ppf(SHARE, df=3)))
-"""Standard deviations, in space."""
+REACH = float(np.sqrt(2.0 * gammaincinv(3.0 / 2.0, SHARE)))
+"""Standard deviations, in space: the root of the quantile of chi-square with three degrees of freedom."""
 
 
 class EstimateLike(Protocol):
