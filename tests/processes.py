@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import dask
+import httpx
 import psutil
 
 from app.access.auth import Auth
@@ -106,11 +108,22 @@ class Server:
         return self.process.wait(LONGEST)
 
 
-def start_server(state_dir: Path, *arguments: str) -> Server:
+def workers_of(cluster: str) -> dict[str, str]:
+    """The variables by which a process uses the workers of the fixture `cluster`: its own take seconds."""
+    tls = dask.config.get("distributed.comm.tls")
+    return {
+        "SNAP6D_SCHEDULER_ADDRESS": cluster,
+        "DASK_DISTRIBUTED__COMM__TLS__CA_FILE": tls["ca-file"],
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY": tls["client"]["key"],
+        "DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT": tls["client"]["cert"],
+    }
+
+
+def start_server(state_dir: Path, *arguments: str, **variables: str) -> Server:
     """Start a server on a free port and wait until it tells its sign-in link."""
     process = subprocess.Popen(
         [sys.executable, "-m", "app.cli.commands", "serve", "--port", "0", *arguments],
-        env=environment(state_dir),
+        env=environment(state_dir) | variables,
         cwd=REPOSITORY,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -132,13 +145,24 @@ def started(process: subprocess.Popen[str], state_dir: Path) -> Server:
 
 
 @contextmanager
-def serving(state_dir: Path, *arguments: str) -> Iterator[Server]:
+def serving(state_dir: Path, *arguments: str, **variables: str) -> Iterator[Server]:
     """A server on a free port; however the block ends, nothing of it is left."""
-    server = start_server(state_dir, *arguments)
+    server = start_server(state_dir, *arguments, **variables)
     try:
         yield server
     finally:
         server.kill()
+
+
+@contextmanager
+def signed_in(state_dir: Path, *arguments: str, **variables: str) -> Iterator[tuple[Server, httpx.Client]]:
+    """A server, and its administrator."""
+    with (
+        serving(state_dir, *arguments, **variables) as server,
+        httpx.Client(base_url=server.url, timeout=LONGEST) as http,
+    ):
+        assert http.post("/api/sign-in/link", json={"token": server.secret}).status_code == 204
+        yield server, http
 
 
 def descendants(pid: int) -> set[int]:

@@ -25,6 +25,7 @@ from app.storage.files import FileStore
 from app.storage.roles import Role
 from app.workers.pool import start_workers
 from tests.app import postgres
+from tests.app.empty_database import new_empty_database
 from tests.app.labeling.live_sessions import sign_up
 from tests.app.live import LiveServer, running_server
 from tests.app.small_dataset import NAME, write_small_dataset
@@ -74,8 +75,7 @@ def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Databas
         server, template = (request.getfixturevalue(f"postgres_{name}") for name in ("server", "template"))
         opened = Database(postgres.new_database(server, template))
     else:
-        opened = Database(f"sqlite:///{tmp_path / 'snap6d.sqlite'}")
-        opened.migrate()
+        opened = new_empty_database(tmp_path)
     yield opened
     opened.close()
 
@@ -115,9 +115,7 @@ def cluster() -> Iterator[str]:
 def imported_state(demo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A state directory into which the small dataset was imported; to be copied."""
     settings = Settings(state_dir=tmp_path_factory.mktemp("imported") / "state")
-    settings.state_dir.mkdir()
-    database = Database(settings.resolved_database_url)
-    database.migrate()
+    database = new_empty_database(settings.state_dir)
     import_dataset(database, FileStore(settings.files_dir), demo)
     database.close()
     return settings.state_dir

@@ -37,6 +37,7 @@ __all__ = [
     "NEAR_VIEW",
     "SIDE_VIEW",
     "TOOL",
+    "T_OBJECT_GIZMO",
     "change_json",
     "true_pose",
     "write_small_dataset",
@@ -44,6 +45,8 @@ __all__ = [
 
 NAME = "tools"
 TRUE_POSES = {TOOL: T_WORLD_TOOL, BLOCK: T_WORLD_BLOCK}
+T_OBJECT_GIZMO = pose.from_rotation_translation(np.eye(3), model_of(mesh_of(TOOL)).centre)
+"""The gizmo of the tool sits in its middle."""
 POSED_SCENE, UNPOSED_SCENE = "test/000001", "test/000002"
 VIEWS = {0: NEAR_VIEW, 5: SIDE_VIEW}
 

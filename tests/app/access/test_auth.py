@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 from pwdlib import PasswordHash
+from pwdlib.hashers.argon2 import Argon2Hasher
 from sqlalchemy import select, text
 
 from app.access.auth import CHECKS_AT_ONCE, CHECKS_WAITING, Auth, Identity, SignInError, TooManyAttemptsError
@@ -22,7 +23,9 @@ HERE, ELSEWHERE = "192.0.2.1", "198.51.100.7"
 
 @pytest.fixture
 def auth(database: Database) -> Iterator[Auth]:
+    """Hashes passwords as any, but at the least cost."""
     opened = Auth(database)
+    opened._passwords = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
     yield opened
     opened.close()
 
@@ -82,6 +85,14 @@ def test_the_right_password_signs_in(auth):
     assert auth.sign_in("ann", PASSWORD, HERE) != secret
 
 
+def test_passwords_are_hashed_at_the_cost_that_is_recommended(database):
+    user = Auth(database).create_user("ann", Role.OPERATOR, PASSWORD)
+    kept, recommended = (
+        str(made).split("$") for made in (user.password_hash, PasswordHash.recommended().hash("any"))
+    )
+    assert kept[1:4] == recommended[1:4]
+
+
 @pytest.mark.parametrize(
     ("name", "password"),
     [("ann", "wrong"), ("ann", ""), ("nobody", PASSWORD), ("linked", ""), ("Ann", PASSWORD)],
@@ -131,7 +142,7 @@ def test_guessing_has_to_wait_longer_and_longer(auth, monkeypatch):
     auth.sign_in("ann", PASSWORD, HERE)
 
 
-def test_spelling_a_name_with_spaces_does_not_buy_more_guesses(auth):
+def test_spelling_a_name_with_spaces_does_not_buy_more_guesses(auth, still):
     auth.create_user("ann", Role.OPERATOR, PASSWORD)
     for i in range(FREE_ATTEMPTS):
         with pytest.raises(SignInError):

@@ -22,7 +22,7 @@ from tests.app.waiting import wait_until
 
 OK = {200, 202}
 SHUT_OUT = {401, 404, 409}
-ROUNDS = 4
+ROUNDS = 2
 
 
 def at_work(stop: Signal, steps: Callable[[int], list[httpx.Response]]) -> list[httpx.Response]:

@@ -9,10 +9,18 @@ import pytest
 from tests.app.export.site import ExportedSite, Site, make_site
 
 
+@pytest.fixture(scope="session")
+def made_site(tmp_path_factory: pytest.TempPathFactory) -> Site:
+    """A dataset in which nothing is submitted, to be copied."""
+    site = make_site(tmp_path_factory.mktemp("site"))
+    site.database.close()
+    return site
+
+
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Site]:
+def site(made_site: Site, tmp_path: Path) -> Iterator[Site]:
     """A dataset in which nothing is submitted."""
-    site = make_site(tmp_path)
+    site = made_site.copied(tmp_path)
     yield site
     site.database.close()
 

@@ -6,16 +6,15 @@ from sqlalchemy import select
 
 from app.datasets.importing import import_dataset
 from app.export.job import export_dataset
-from app.storage.database import Database
 from app.storage.files import FileStore
 from app.storage.tables import Registration, Task, User
+from tests.app.empty_database import new_empty_database
 from tests.app.export.site import START, ignore_progress
 
 
 def labelled_export(source: Path, folder: Path) -> Path:
     """Import a dataset, submit every known pose, export it."""
-    database, files = Database(f"sqlite:///{folder / 'snap6d.sqlite'}"), FileStore(folder / "files")
-    database.migrate()
+    database, files = new_empty_database(folder), FileStore(folder / "files")
     dataset_id = import_dataset(database, files, source).dataset_id
     with database.write() as session:
         user = User(name="Ada Lovelace", role="operator")

@@ -1,8 +1,9 @@
 """A small labelled dataset in a real database and file store: boxes on a table, seen by a depth camera."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import trimesh
@@ -21,6 +22,7 @@ from registration_core.bop.writer import write_color_png, write_depth_png, write
 from registration_core.geometry import pose
 from registration_core.geometry.object_model import discrete
 from registration_core.rendering.rasterizer import render_depth
+from tests.app.empty_database import NAME, new_empty_database
 
 CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
 DEPTH_SCALE = 0.1
@@ -97,6 +99,12 @@ class Site:
     tasks: dict[tuple[str, int], int] = field(default_factory=dict)
     """Task id by scene label and obj_id."""
 
+    def copied(self, folder: Path) -> "Site":
+        """The same in another folder, to be changed; this one has to be at rest."""
+        copytree(self.folder, folder, dirs_exist_ok=True)
+        database = Database(f"sqlite:///{folder / NAME}")
+        return replace(self, database=database, files=FileStore(folder / "files"), folder=folder)
+
     def submit(self, task_id: int, T_world_object: np.ndarray, user: int = 0, minutes: float = 0.0) -> int:
         """A submitted registration; its id."""
         with self.database.write() as session:
@@ -153,8 +161,7 @@ def true_pose(label: str, obj_id: int) -> np.ndarray:
 
 def make_site(folder: Path) -> Site:
     """The dataset in a new database: nothing is submitted yet."""
-    database = Database(f"sqlite:///{folder / 'snap6d.sqlite'}")
-    database.migrate()
+    database = new_empty_database(folder)
     site = Site(database, FileStore(folder / "files"), folder)
     with database.write() as session:
         users = [User(name=name, role="operator") for name in ("Ada Lovelace", "Grace Hopper")]

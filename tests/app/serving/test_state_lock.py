@@ -18,7 +18,7 @@ from app.serving.state_lock import StateInUseError, held, running_server
 from app.storage.database import Database
 from app.storage.tables import Export, User
 from tests.app.waiting import LONGEST
-from tests.processes import failure, run_snap6d, serving
+from tests.processes import failure, run_snap6d, serving, workers_of
 
 pytestmark = pytest.mark.slow  # servers in processes of their own
 
@@ -78,9 +78,9 @@ def test_a_file_system_without_locks_is_warned_of(
     assert "cannot be locked" in caplog.text
 
 
-def test_a_second_server_stops_and_an_export_under_way_goes_on(state_dir: Path) -> None:
+def test_a_second_server_stops_and_an_export_under_way_goes_on(state_dir: Path, cluster: str) -> None:
     database = Database(Settings(state_dir=state_dir).resolved_database_url)
-    with serving(state_dir, "--workers", "1") as server:
+    with serving(state_dir, **workers_of(cluster)) as server:
         with database.write() as session:
             session.add(User(name="ann", role="admin"))
             session.flush()

@@ -19,7 +19,7 @@ from app.storage.database import Database
 from app.storage.named_files import open_store
 from app.storage.tables import Export, Frame, User
 from tests.app.waiting import LONGEST, wait_until
-from tests.processes import Command, failure, run_snap6d, serving
+from tests.processes import Command, failure, run_snap6d, serving, workers_of
 
 
 class Writer:
@@ -83,20 +83,23 @@ def test_a_backup_amid_writes_holds_what_was_saved_and_all_its_files(state_dir: 
 
 
 @pytest.mark.slow
-def test_a_server_starts_on_what_a_running_one_was_backed_up_to(state_dir: Path, tmp_path: Path) -> None:
+def test_a_server_starts_on_what_a_running_one_was_backed_up_to(
+    state_dir: Path, tmp_path: Path, cluster: str
+) -> None:
     archive = tmp_path / "backup.tar"
 
     def tasks_of(url: str, http: httpx.Client) -> list[dict]:
         return http.get(f"{url}/api/tasks").json()["items"]
 
-    with serving(state_dir, "--workers", "1") as server, httpx.Client(timeout=LONGEST) as http:
+    workers = workers_of(cluster)
+    with serving(state_dir, **workers) as server, httpx.Client(timeout=LONGEST) as http:
         token = server.command("token", "create", "robot").strip()
         http.headers["authorization"] = f"Bearer {token}"
         before = tasks_of(server.url, http)
         printed = server.command("backup", str(archive))
         assert printed == f"{archive}: the database and 6 files.\n"
     with (
-        serving(restored(archive, tmp_path / "again"), "--workers", "1") as server,
+        serving(restored(archive, tmp_path / "again"), **workers) as server,
         httpx.Client(timeout=LONGEST) as http,
     ):
         http.headers["authorization"] = f"Bearer {token}"

@@ -18,10 +18,9 @@ from app.storage.unfinished import PREFIX
 from registration_core.geometry import pose
 from tests.app.labeling.viser_client import ViserClient
 from tests.app.rest import begin, finished_snap, kinds, put_pose, sentence
-from tests.app.small_dataset import TOOL, true_pose
-from tests.app.test_kill import T_OBJECT_GIZMO, signed_in
+from tests.app.small_dataset import T_OBJECT_GIZMO, TOOL, true_pose
 from tests.app.waiting import wait_until
-from tests.processes import Server, failure, run_snap6d, start_server
+from tests.processes import Server, failure, run_snap6d, serving, signed_in, workers_of
 
 pytestmark = pytest.mark.slow  # servers in processes of their own
 
@@ -94,10 +93,13 @@ def dragged(server: Server, http: httpx.Client, registration_id: int, T: np.ndar
 
 
 def test_a_server_whose_disk_fills_up_loses_nothing_and_goes_on(
-    disk: SmallDisk, demo: Path, tmp_path: Path
+    disk: SmallDisk, demo: Path, tmp_path: Path, cluster: str
 ) -> None:
     archive = make_archive(str(tmp_path / "more"), "zip", demo.parent, demo.name)
-    with signed_in(disk.state_dir) as (server, http), httpx.Client(base_url=server.url) as stranger:
+    with (
+        signed_in(disk.state_dir, **workers_of(cluster)) as (server, http),
+        httpx.Client(base_url=server.url) as stranger,
+    ):
         link = {"token": server.new_link("zoe").rsplit("#")[1]}
         registration = begin(http)
         url = f"/api/registrations/{registration['id']}"
@@ -139,13 +141,13 @@ def test_a_server_whose_disk_fills_up_loses_nothing_and_goes_on(
     assert run_snap6d(disk.state_dir, "check").returncode == 0
 
 
-def test_a_server_does_not_start_on_a_full_disk_and_says_so(disk: SmallDisk) -> None:
+def test_a_server_does_not_start_on_a_full_disk_and_says_so(disk: SmallDisk, cluster: str) -> None:
     disk.fill()
-    said = failure(run_snap6d(disk.state_dir, "serve", "--port", "0", "--workers", "1"))
+    said = failure(run_snap6d(disk.state_dir, "serve", "--port", "0", **workers_of(cluster)))
     assert FULL in said or f"state folder {disk.state_dir} (No space left on device)" in said
     disk.free()
-    server = start_server(disk.state_dir, "--workers", "1")
-    server.kill()
+    with serving(disk.state_dir, **workers_of(cluster)):
+        pass
 
 
 def test_a_read_only_state_folder_is_told(disk: SmallDisk, demo: Path) -> None:

@@ -1,12 +1,13 @@
 """Fixtures: studies of the small dataset."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from sqlalchemy import select
 
 from app.access.auth import Auth
-from app.datasets.importing import import_dataset
+from app.config import Settings
 from app.datasets.scene_data import SceneData
 from app.storage.database import Database
 from app.storage.files import FileStore
@@ -17,9 +18,22 @@ from app.study.studies import Studies
 
 
 @pytest.fixture
-def studies(database: Database, files: FileStore, demo: Path) -> Studies:
-    """Of a database into which the small dataset was imported."""
-    import_dataset(database, files, demo)
+def database(state_dir: Path) -> Iterator[Database]:
+    """A database into which the small dataset was imported."""
+    opened = Database(Settings(state_dir=state_dir).resolved_database_url)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def files(state_dir: Path) -> FileStore:
+    """Its files."""
+    return FileStore(Settings(state_dir=state_dir).files_dir)
+
+
+@pytest.fixture
+def studies(database: Database, files: FileStore) -> Studies:
+    """Of the small dataset."""
     return Studies(database, SceneData(files))
 
 

@@ -5,7 +5,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -17,28 +17,34 @@ from app.config import Settings
 from app.storage.database import Database
 from tests.app.waiting import LONGEST, wait_until
 from tests.conftest import REPOSITORY
-from tests.processes import command_line, descendants, environment, run_snap6d
+from tests.processes import command_line, descendants, environment, run_snap6d, workers_of
 
 pytestmark = pytest.mark.slow  # a command with workers, killed and run again
 
 STUDY = "try"
+Run = Callable[..., str]
 
 
 @pytest.fixture
-def simulated(state_dir: Path) -> Path:
+def run(cluster: str) -> Run:
+    """What a command about studies prints, in a process of its own on workers that are there already."""
+
+    def printed(state: Path, *arguments: str) -> str:
+        done = run_snap6d(state, "study", *arguments, **workers_of(cluster))
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return printed
+
+
+@pytest.fixture
+def simulated(run: Run, state_dir: Path) -> Path:
     """A state with a study of two simulated operators in one scene."""
     run(state_dir, "simulate", STUDY, "--operators", "1", "--scenes", "1")
     return state_dir
 
 
-def run(state: Path, *arguments: str) -> str:
-    """What a command about studies prints."""
-    done = run_snap6d(state, "study", *arguments)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-def report_by_command(state: Path, out: Path) -> Mapping[str, bytes]:
+def report_by_command(run: Run, state: Path, out: Path) -> Mapping[str, bytes]:
     """All files of the report, as the command writes them."""
     printed = run(state, "report", STUDY, "--out", str(out))
     files = {path.name: path.read_bytes() for path in out.iterdir()}
@@ -64,7 +70,7 @@ def kill_half_way(state: Path) -> None:
     """Start the batch, and end it as a crash or a power cut would, once something is stored."""
     process = subprocess.Popen(
         [sys.executable, "-m", "app.cli.commands", "study", "snap", STUDY],
-        env=environment(state),
+        env=environment(state) | {"SNAP6D_WORKERS": "1"},
         cwd=REPOSITORY,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -78,7 +84,7 @@ def kill_half_way(state: Path) -> None:
     wait_until(lambda: not any(map(command_line, workers)), "the workers to go")
 
 
-def test_killed_half_way_it_comes_to_the_same_bytes(simulated: Path, tmp_path: Path) -> None:
+def test_killed_half_way_it_comes_to_the_same_bytes(simulated: Path, run: Run, tmp_path: Path) -> None:
     undisturbed = Path(shutil.copytree(simulated, tmp_path / "undisturbed"))
     printed = run(undisturbed, "snap", STUDY)
     kill_half_way(simulated)
@@ -88,7 +94,7 @@ def test_killed_half_way_it_comes_to_the_same_bytes(simulated: Path, tmp_path: P
     assert f"{len(whole)} sampled poses" in run(simulated, "snap", STUDY)
     after = stored(simulated)
     assert len(after) == len(whole) and before.items() <= after.items()
-    files = report_by_command(undisturbed, tmp_path / "report of the undisturbed")
+    files = report_by_command(run, undisturbed, tmp_path / "report of the undisturbed")
     assert {Path(name).suffix for name in files} == {".svg", ".pdf", ".html", ".csv", ".parquet"}
     assert report_by_call(simulated, tmp_path / "report of the killed") == files
     assert b"simulated" in files["figure.svg"] and b"simulated" in files["report.html"]
