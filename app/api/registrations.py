@@ -144,23 +144,27 @@ def show_layers(body: Layers, live_session: LiveSessionDep) -> RegistrationOut:
     return registration_out(live_session)
 
 
-def _add_action(name: str, act: Callable[[LabelingSession, Actor], None], summary: str) -> None:
+def _add_action(name: str, act: Callable[[LabelingSession, Actor], None], description: str) -> None:
     def route(live_session: LiveSessionDep, identity: AnyoneDep) -> RegistrationOut:
         act(live_session.session, identity.actor)
         return registration_out(live_session)
 
     router.add_api_route(
-        f"/{{registration_id}}/{name}", route, methods=["POST"], summary=summary, name=f"{name}_registration"
+        f"/{{registration_id}}/{name}",
+        route,
+        methods=["POST"],
+        description=description,
+        name=f"{name}_registration",
     )
 
 
-_add_action("undo", LabelingSession.undo, "Take the last change of pose back")
-_add_action("redo", LabelingSession.redo, "Bring back what was undone last")
-_add_action("reset", LabelingSession.reset, "Put the object back to where it began")
-_add_action("accept", LabelingSession.accept, "Take the pose that the machine offers")
-_add_action("dismiss", LabelingSession.dismiss, "Decline the pose that the machine offers")
-_add_action("submit", LabelingSession.submit, "Finish with the present pose")
-_add_action("reopen", LabelingSession.reopen, "Go on with what was submitted or skipped")
+_add_action("undo", LabelingSession.undo, "Take the last change of pose back.")
+_add_action("redo", LabelingSession.redo, "Bring back what was undone last.")
+_add_action("reset", LabelingSession.reset, "Put the object back to where it began.")
+_add_action("accept", LabelingSession.accept, "Take the pose that the machine offers.")
+_add_action("dismiss", LabelingSession.dismiss, "Decline the pose that the machine offers.")
+_add_action("submit", LabelingSession.submit, "Finish with the present pose.")
+_add_action("reopen", LabelingSession.reopen, "Go on with what was submitted or skipped.")
 
 
 @router.post("/{registration_id}/skip")
