@@ -22,6 +22,8 @@ router = APIRouter(include_in_schema=False)
 SUBPROTOCOL_PREFIX = "viser-v"
 REFUSED = 4403
 """Close code of a WebSocket that may not be opened."""
+PATIENCE = 60.0
+"""Seconds for a file of the view's page, which is a large one: a machine may be busy with others."""
 SECONDS_BETWEEN_LOGIN_CHECKS = 2.0
 """A view that is open closes no later than that after its login has ended."""
 
@@ -43,7 +45,7 @@ async def fetched(request: Request, view: Path, path: str) -> Response:
     """A file of the page of the view on a socket file."""
     # verify=False: there is no TLS on a socket file, and reading all certificates takes 26 ms
     transport = httpx.AsyncHTTPTransport(uds=str(view), verify=False)
-    async with httpx.AsyncClient(transport=transport) as client:
+    async with httpx.AsyncClient(transport=transport, timeout=PATIENCE) as client:
         answer = await client.get(f"http://view/{quote(path)}")
     return Response(
         answer.content,
