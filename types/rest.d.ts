@@ -729,7 +729,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Take the last change of pose back */
+        /**
+         * Undo Registration
+         * @description Take the last change of pose back.
+         */
         post: operations["undo_registration_api_registrations__registration_id__undo_post"];
         delete?: never;
         options?: never;
@@ -746,7 +749,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Bring back what was undone last */
+        /**
+         * Redo Registration
+         * @description Bring back what was undone last.
+         */
         post: operations["redo_registration_api_registrations__registration_id__redo_post"];
         delete?: never;
         options?: never;
@@ -763,7 +769,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Put the object back to where it began */
+        /**
+         * Reset Registration
+         * @description Put the object back to where it began.
+         */
         post: operations["reset_registration_api_registrations__registration_id__reset_post"];
         delete?: never;
         options?: never;
@@ -780,7 +789,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Take the pose that the machine offers */
+        /**
+         * Accept Registration
+         * @description Take the pose that the machine offers.
+         */
         post: operations["accept_registration_api_registrations__registration_id__accept_post"];
         delete?: never;
         options?: never;
@@ -797,7 +809,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Decline the pose that the machine offers */
+        /**
+         * Dismiss Registration
+         * @description Decline the pose that the machine offers.
+         */
         post: operations["dismiss_registration_api_registrations__registration_id__dismiss_post"];
         delete?: never;
         options?: never;
@@ -814,7 +829,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Finish with the present pose */
+        /**
+         * Submit Registration
+         * @description Finish with the present pose.
+         */
         post: operations["submit_registration_api_registrations__registration_id__submit_post"];
         delete?: never;
         options?: never;
@@ -831,7 +849,10 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** Go on with what was submitted or skipped */
+        /**
+         * Reopen Registration
+         * @description Go on with what was submitted or skipped.
+         */
         post: operations["reopen_registration_api_registrations__registration_id__reopen_post"];
         delete?: never;
         options?: never;
