@@ -113,6 +113,10 @@ interface Element {
 }
 
 /** What scripts look for by a selector is HTML. */
+interface Element {
+  closest(selectors: string): HTMLElement | null;
+}
+
 interface ParentNode {
   querySelector<Tag extends keyof HTMLElementTagNameMap>(selectors: Tag): HTMLElementTagNameMap[Tag] | null;
   querySelector(selectors: string): HTMLElement | null;

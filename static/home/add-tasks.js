@@ -5,7 +5,11 @@ import { byId, element, picture, setText } from "../shared/dom.js";
 import { count, METHODS } from "../shared/format.js";
 import { messageArea } from "../shared/message.js";
 
-/** `onAdded(number)` is called after tasks were made. */
+/**
+ * `onAdded(number)` is called after tasks were made.
+ *
+ * @param {(added: number) => unknown} onAdded
+ */
 export function setUpAddTasks(onAdded) {
   const dialog = byId("add-tasks");
   const datasetSelect = byId("add-dataset");

@@ -5,7 +5,11 @@ import { byId, setText } from "../shared/dom.js";
 import { fileSize } from "../shared/format.js";
 import { messageArea } from "../shared/message.js";
 
-/** `onImported(dataset)` is called after a successful import. */
+/**
+ * `onImported(dataset)` is called after a successful import.
+ *
+ * @param {(dataset: Rest["DatasetOut"]) => unknown} onImported
+ */
 export function setUpImport(onImported) {
   const dialog = byId("import");
   const input = byId("import-file");

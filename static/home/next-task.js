@@ -4,7 +4,12 @@ import { nextTask } from "../shared/api.js";
 import { byId, element, icon, picture } from "../shared/dom.js";
 import { addressWith } from "../shared/task-filter.js";
 
-/** Shows the next task of a dataset, or of all; without one, says so. Hidden while there are no tasks at all. */
+/**
+ * Shows the next task of a dataset, or of all; without one, says so. Hidden while there are no tasks at all.
+ *
+ * @param {Rest["DatasetOut"][]} datasets
+ * @param {string | number | null} datasetId
+ */
 export async function showNextTask(datasets, datasetId) {
   const anyTasks = datasets.some((dataset) => dataset.tasks > 0);
   byId("next").hidden = !anyTasks;

@@ -8,7 +8,11 @@ import { messageArea } from "../shared/message.js";
 const CHOICES = [0.01, 0.02, 0.05, 0.1];
 const OTHER = "other";
 
-/** `onSet(dataset)` is called after a dataset's risk was set. */
+/**
+ * `onSet(dataset)` is called after a dataset's risk was set.
+ *
+ * @param {(dataset: Rest["DatasetOut"]) => unknown} onSet
+ */
 export function setUpRisk(onSet) {
   const dialog = byId("risk");
   const message = messageArea(byId("risk-message"));

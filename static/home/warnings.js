@@ -5,10 +5,18 @@ import { byId, element, setText } from "../shared/dom.js";
 import { count } from "../shared/format.js";
 import { messageArea } from "../shared/message.js";
 
-/** Those that nobody has accepted yet. */
+/**
+ * Those that nobody has accepted yet.
+ *
+ * @param {Rest["DatasetOut"]} dataset
+ */
 export const openWarnings = ({ warnings }) => warnings.filter(({ accepted }) => !accepted);
 
-/** `onAccepted(dataset)` is called after a dataset's warnings were accepted. */
+/**
+ * `onAccepted(dataset)` is called after a dataset's warnings were accepted.
+ *
+ * @param {(dataset: Rest["DatasetOut"]) => unknown} onAccepted
+ */
 export function setUpWarnings(onAccepted) {
   const dialog = byId("warnings");
   const message = messageArea(byId("warnings-message"));

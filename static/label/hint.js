@@ -3,7 +3,11 @@
 const UNSURE = 0.5;
 const IN_PLACE = "Right from every side? Then submit.";
 
-/** The hint for a registration, or an empty text. */
+/**
+ * The hint for a registration, or an empty text.
+ *
+ * @param {Registration} registration
+ */
 export function hintFor({ state, tools, can_undo: moved, confidence, snap, offer }) {
   if (state !== "open" || offer || snap?.state === "queued" || snap?.state === "running") return "";
   if (!tools.includes("snap")) return moved ? IN_PLACE : "Drag the object onto its points.";

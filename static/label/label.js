@@ -314,13 +314,13 @@ function submitOrGoOn() {
 function showLost() {
   connected = false;
   byId("connection").hidden = false;
-  drawPanel(registration, connected);
+  drawPanel(page.registration(), connected);
   focusView();
 }
 
 function showTakenOver() {
   connected = false;
-  drawPanel(registration, connected);
+  drawPanel(page.registration(), connected);
   closeView();
   const text = "It goes on there, with everything you did here. This tab no longer follows it.";
   showClosed("This task was opened in another tab", text, "Continue here instead");

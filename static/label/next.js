@@ -15,6 +15,8 @@ export async function goToNext() {
 /**
  * Shows where `#next-task` leads: to another task of the dataset, and of what was chosen on the home page; without
  * one it leads home.
+ *
+ * @param {Rest["TaskOut"]} task
  */
 export function showNext({ dataset }) {
   shown = show(dataset);

@@ -20,10 +20,16 @@ const UNASKED = {
   failed: "The machine finds nothing from here.",
 };
 
-/** What can be done now, by action. */
+/**
+ * What can be done now, by action.
+ *
+ * @param {Registration | null} registration
+ * @param {boolean} connected
+ */
 export function possible(registration, connected) {
   const open = registration?.state === "open" && connected;
-  const has = (tool) => open && registration.tools.includes(tool);
+  const tools = registration?.tools ?? [];
+  const has = (tool) => open && tools.includes(tool);
   const shown = registration?.offer ?? registration?.live ?? null;
   return {
     snap: has("snap"),
@@ -34,13 +40,17 @@ export function possible(registration, connected) {
     redo: open && registration.can_redo,
     reset: open && registration.can_undo,
     submit: open && !isSnapping(registration) && !registration.dragging,
-    skip: has("ending") && !registration.dragging,
+    skip: has("ending") && !registration?.dragging,
     reopen: connected && registration !== null && registration.state !== "open",
     "offer-accept": open && shown !== null,
     "offer-dismiss": open && registration.offer !== null,
   };
 }
 
+/**
+ * @param {Registration} registration
+ * @param {boolean} connected
+ */
 export function drawPanel(registration, connected) {
   for (const [id, can] of Object.entries(possible(registration, connected))) byId(id).disabled = !can;
   drawSaved(registration, connected);

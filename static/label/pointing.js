@@ -72,7 +72,13 @@ function placeInView(view, { clientX, clientY }) {
   return { across: clientX / view.innerWidth, down: clientY / view.innerHeight };
 }
 
-/** The page's {x, y} of a pixel of the image, however it is scaled or shifted. */
+/**
+ * The page's {x, y} of a pixel of the image, however it is scaled or shifted.
+ *
+ * @param {HTMLImageElement} image
+ * @param {number} column
+ * @param {number} row
+ */
 export function placeOfPixel(image, column, row) {
   const { scale, left, top } = shownAt(image);
   return { x: left + (column + 0.5) * scale, y: top + (row + 0.5) * scale };

@@ -9,6 +9,8 @@ const HOME = { label: "Back to the tasks", run: () => location.assign("/") };
 /**
  * Makes the dialog and returns who is signed in: {id, name}. Should the login end, the dialog asks for the same
  * person; `onBack` is called when they are there again.
+ *
+ * @param {() => void} onBack
  */
 export async function signInAgainHere(onBack) {
   const dialog = byId("sign-in-again");

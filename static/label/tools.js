@@ -2,9 +2,13 @@
 
 const MARKED = "[data-tool]";
 
-/** Puts away all that needs a tool other than these; the server refuses it as well. */
+/**
+ * Puts away all that needs a tool other than these; the server refuses it as well.
+ *
+ * @param {Set<string>} tools
+ */
 export function showTools(tools) {
   for (const node of document.querySelectorAll(MARKED)) {
-    node.classList.toggle("not-here", !tools.has(node.dataset.tool));
+    node.classList.toggle("not-here", !tools.has(node.dataset.tool ?? ""));
   }
 }

@@ -12,16 +12,27 @@ const SLOW = "The worker takes long. You can go on by hand, or cancel.";
 
 let told = { id: null, text: "" };
 
+/**
+ * @param {Pick<Registration, "snap">} registration
+ */
 export function isSnapping({ snap }) {
   return snap?.state === "queued" || snap?.state === "running";
 }
 
-/** What there is to say of a snap that takes longer than usual, or null. */
+/**
+ * What there is to say of a snap that takes longer than usual, or null.
+ *
+ * @param {{ id: string | null }} snap
+ */
 export function waitingText({ id }) {
   return id !== null && id === told.id ? told.text : null;
 }
 
-/** What there is to say of a snap that a worker is at. */
+/**
+ * What there is to say of a snap that a worker is at.
+ *
+ * @param {{ method: Registration["method"] }} snap
+ */
 export function snappingText({ method }) {
   return method === "paper" ? "The paper’s filter runs…" : "Snapping…";
 }

@@ -51,7 +51,11 @@ export function playbackClock({ duration, idle, onTime, onPlaying }) {
   };
 }
 
-/** "1:02:03.4", "0:07.5". */
+/**
+ * "1:02:03.4", "0:07.5".
+ *
+ * @param {number} seconds
+ */
 export function clockText(seconds) {
   const tenths = Math.round(seconds * 10);
   const [hours, minutes] = [Math.floor(tenths / 36000), Math.floor(tenths / 600) % 60];

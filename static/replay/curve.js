@@ -4,7 +4,13 @@ const LEAST = 0.3; // mm or degrees: nothing below it matters to the eye
 const MARGIN = 9; // pixels above and below
 const DEGREES = 180 / Math.PI;
 
-/** Path data of the two curves [mm, degrees]; `at(seconds)` is a place across. */
+/**
+ * Path data of the two curves [mm, degrees]; `at(seconds)` is a place across.
+ *
+ * @param {Rest["Curve"]} curve
+ * @param {(seconds: number) => number} at
+ * @param {number} height
+ */
 export function curvePaths(curve, at, height) {
   const y = scale(curve, height);
   return bothInPeople(curve).map((values) =>
@@ -12,7 +18,12 @@ export function curvePaths(curve, at, height) {
   );
 }
 
-/** [{value: "10", y}, ...]: the powers of ten within the scale. */
+/**
+ * [{value: "10", y}, ...]: the powers of ten within the scale.
+ *
+ * @param {Rest["Curve"]} curve
+ * @param {number} height
+ */
 export function curveTicks(curve, height) {
   const y = scale(curve, height);
   return [1, 10, 100, 1000]

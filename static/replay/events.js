@@ -24,7 +24,12 @@ const WORDS = {
 };
 const BARELY = 0.001; // seconds
 
-/** Fills the list; `choose(seconds)` is called with the time of an event that is asked for. */
+/**
+ * Fills the list; `choose(seconds)` is called with the time of an event that is asked for.
+ *
+ * @param {Rest["TraceOut"]} trace
+ * @param {(seconds: number) => void} choose
+ */
 export function eventList(trace, choose) {
   const events = trace.events.filter(({ kind }) => kind !== "view");
   const rows = events.map((event) => row(event, choose));

@@ -8,7 +8,12 @@ const CURVE_HEIGHT = 64;
 const HEIGHT = CURVE_HEIGHT + 3 * LANE_HEIGHT;
 const LEAST_LABELLED = 46; // pixels of an idle stretch that has room for its name
 
-/** Draws a trace; returns `place(seconds)`, where a time lies, as a share of the width. */
+/**
+ * Draws a trace; returns `place(seconds)`, where a time lies, as a share of the width.
+ *
+ * @param {Rest["TraceOut"]} trace
+ * @param {(seconds: number) => void} onTime
+ */
 export function drawTimeLine(trace, onTime) {
   const plot = byId("plot");
   const lanes = byId("lanes");

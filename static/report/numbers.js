@@ -8,7 +8,12 @@ export const inPeopleUnits = (value, error) => (error === "translation" ? value 
 
 export const unitOf = (error) => (error === "translation" ? "mm" : "°");
 
-/** "4.2 mm", "12°"; a dash for what is unknown. */
+/**
+ * "4.2 mm", "12°"; a dash for what is unknown.
+ *
+ * @param {number | null} value
+ * @param {"translation" | "rotation"} error
+ */
 export function errorText(value, error) {
   if (value === null) return NONE;
   const number = digits(inPeopleUnits(value, error));
@@ -21,12 +26,21 @@ export const secondsText = (value) => (value === null ? NONE : `${digits(value)}
 /** "94 %". */
 export const shareText = (value) => (value === null ? NONE : `${Math.round(value * 100)}\u00a0%`);
 
-/** "4.2 mm (3.9 mm to 4.6 mm)" of {mean, low, high}; `text` writes one number. */
+/**
+ * "4.2 mm (3.9 mm to 4.6 mm)" of {mean, low, high}; `text` writes one number.
+ *
+ * @param {Pick<Rest["IntervalOut"], "mean" | "low" | "high">} interval
+ * @param {(value: number | null) => string} text
+ */
 export function intervalText({ mean, low, high }, text) {
   return low === null ? text(mean) : `${text(mean)} (${text(low)} to ${text(high)})`;
 }
 
-/** Three significant digits. */
+/**
+ * Three significant digits.
+ *
+ * @param {number | null} value
+ */
 export function digits(value) {
   return value === null ? NONE : String(Number(value.toPrecision(3)));
 }

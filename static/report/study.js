@@ -10,6 +10,10 @@ import { remarksSection, section, tableOf, withCaution } from "./tables.js";
 
 const NAMES = { human: "human", default: "STG", paper: "STG, paper’s filter" };
 
+/**
+ * @param {string | null | undefined} studyId
+ * @param {Message} message
+ */
 export async function showStudy(studyId, message) {
   const url = /** @type {const} */ (`/api/reports/${studyId}`);
   let newest = 0;

@@ -33,7 +33,11 @@ export function replayLink(id) {
   return id === null ? "" : element("a", { href: `/replay/${id}` }, `registration ${id}`);
 }
 
-/** What was left out or handled, each with its replay. */
+/**
+ * What was left out or handled, each with its replay.
+ *
+ * @param {Rest["RemarkOut"][]} remarks
+ */
 export function remarksSection(remarks) {
   const items = remarks.map(({ about, text, registration_id: id }) => {
     const link = replayLink(id);

@@ -11,6 +11,9 @@ import { remarksSection, section, tableOf } from "./tables.js";
 const URL_OF_TEAM = "/api/reports/team";
 const NAMES = { human: "as done", default: "the machine's poses" };
 
+/**
+ * @param {Message} message
+ */
 export async function showTeam(message) {
   const { choices } = await get(URL_OF_TEAM);
   document.title = "Team · Report · Snap6D";

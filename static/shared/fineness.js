@@ -9,7 +9,11 @@ export function rememberedLayers() {
   return JSON.parse(localStorage.getItem(REMEMBERED) ?? "{}");
 }
 
-/** Keeps what the user chose, for this browser. */
+/**
+ * Keeps what the user chose, for this browser.
+ *
+ * @param {Rest["Layers"]} layers
+ */
 export function rememberLayers(layers) {
   localStorage.setItem(REMEMBERED, JSON.stringify(layers));
 }

@@ -27,7 +27,11 @@ export function fileSize(bytes) {
   return `${(bytes / 1e6).toFixed(bytes < 1e7 ? 1 : 0)} MB`;
 }
 
-/** "3 frames", "3 frames, 2 of 2 others agree"; empty where there is one frame and nothing to add. */
+/**
+ * "3 frames", "3 frames, 2 of 2 others agree"; empty where there is one frame and nothing to add.
+ *
+ * @param {Rest["FramesReportOut"] | null} frames
+ */
 export function framesText(frames) {
   if (!frames) return "";
   const { used, agreeing, asked } = frames;

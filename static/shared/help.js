@@ -8,6 +8,8 @@ const SHOWN = { Mod: MOD, Escape: "Esc" };
 /**
  * Fills the overlay with {group, keys, does, caps?, tool?}, `caps` standing for many keys; returns the
  * function that opens it.
+ *
+ * @param {GroupedBinding[]} bindings
  */
 export function setUpHelp(bindings) {
   const groups = Map.groupBy(bindings, ({ group }) => group);
@@ -27,7 +29,7 @@ function section(name, rows) {
   return element("section", { className: "key-group" }, element("h3", {}, name), element("dl", {}, ...rows));
 }
 
-function row({ keys, does, caps, tool }) {
+function row(/** @type {GroupedBinding} */ { keys, does, caps, tool }) {
   const props = { "data-keys": keys.join(" "), ...(tool ? { "data-tool": tool } : {}) };
   const shown = caps ? joinedCaps(caps) : keyCaps(keys);
   return element("div", props, element("dt", {}, ...shown), element("dd", {}, does));

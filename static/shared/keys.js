@@ -61,10 +61,14 @@ function belongsToControl(event) {
   return (event.key === " " || event.key === "Enter") && target.closest("button, a, summary") !== null;
 }
 
-/** Gives the focus back after a press by mouse, so that the next Space is a snap and not the same button. */
+/**
+ * Gives the focus back after a press by mouse, so that the next Space is a snap and not the same button.
+ *
+ * @param {Document} root
+ */
 export function releaseFocusAfterPointer(root) {
   root.addEventListener("click", (event) => {
     const byPointer = event.detail > 0;
-    if (byPointer) event.target.closest("button, summary")?.blur();
+    if (byPointer) /** @type {HTMLElement} */ (event.target).closest("button, summary")?.blur();
   });
 }

@@ -5,7 +5,12 @@ import { count } from "../shared/format.js";
 
 const MINUTES_AN_HOUR = 60;
 
-/** Entries of a <dl>, of a plan and of what the server previews of it. */
+/**
+ * Entries of a <dl>, of a plan and of what the server previews of it.
+ *
+ * @param {Required<Rest["StudyPlan"]>} plan
+ * @param {Rest["PreviewOut"]} preview
+ */
 export function amountsOf({ groups, modes, conditions, tasks, practice }, { minutes }) {
   const counting = tasks.length * modes.length * conditions.length;
   const trying = practice.length * conditions.length;
@@ -19,7 +24,12 @@ export function amountsOf({ groups, modes, conditions, tasks, practice }, { minu
   ];
 }
 
-/** What the times assume, and how the order is balanced. */
+/**
+ * What the times assume, and how the order is balanced.
+ *
+ * @param {{ groups: Record<string, number> }} plan
+ * @param {Rest["PreviewOut"]} preview
+ */
 export function noteOn({ groups }, { rows_of_balance: rows, orders, minutes_a_task: assumed }) {
   const uneven = Object.entries(groups)
     .filter(([, size]) => size % rows)

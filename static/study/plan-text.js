@@ -2,7 +2,11 @@
 
 const OPTIONAL = /\s*\(optional\)\s*(?=:|$)/i; // after the question, or at the end of the line
 
-/** "novice 8, expert 8" as [["novice", 8], ["expert", 8]]; 0 where no number is given. */
+/**
+ * "novice 8, expert 8" as [["novice", 8], ["expert", 8]]; 0 where no number is given.
+ *
+ * @param {string} text
+ */
 export function groupsOf(text) {
   return listOf(text, ",").map((part) => {
     const [, name, size] = part.match(/^(.*?)\s*(\d+)$/) ?? [null, part, "0"];
@@ -10,7 +14,11 @@ export function groupsOf(text) {
   });
 }
 
-/** "Handedness (optional): left, right" as {text: "Handedness", choices: ["left", "right"], optional: true}, a line each. */
+/**
+ * "Handedness (optional): left, right" as {text: "Handedness", choices: ["left", "right"], optional: true}, a line each.
+ *
+ * @param {string} text
+ */
 export function questionsOf(text) {
   return listOf(text, "\n").map((line) => {
     const [question, choices = ""] = line.replace(OPTIONAL, "").split(/:(.*)/s);

@@ -26,7 +26,11 @@ const MEANINGS = {
   "find it": "Snap, and the machine looks by itself",
 };
 
-/** Shows the form once all of it is there. */
+/**
+ * Shows the form once all of it is there.
+ *
+ * @param {Message} pageMessage
+ */
 export async function showSetUp(pageMessage) {
   const form = byId("set-up");
   const message = messageArea(byId("preview-message"));

@@ -26,6 +26,10 @@ const erasing = (code) => ({
   yes: "Erase",
 });
 
+/**
+ * @param {string | null | undefined} id
+ * @param {Message} message
+ */
 export async function showStudy(id, message) {
   const url = /** @type {const} */ (`/api/studies/${id}`);
   /** @type {Rest["StudyDetail"]} */

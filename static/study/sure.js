@@ -2,7 +2,12 @@
 
 import { byId, setText } from "../shared/dom.js";
 
-/** Runs `run` where the person says yes; `question` is {title, text, yes}. */
+/**
+ * Runs `run` where the person says yes; `question` is {title, text, yes}.
+ *
+ * @param {{ title: string, text: string, yes: string }} question
+ * @param {() => unknown} run
+ */
 export function askFirst({ title, text, yes }, run) {
   const dialog = byId("sure");
   setText(byId("sure-title"), title);

@@ -6,7 +6,11 @@ import { count } from "../shared/format.js";
 const FOUND = "Nothing is called so: change or empty the two searches.";
 const NO_TASKS = "This dataset has no tasks yet: add some on the home page first.";
 
-/** Fills the list's place; calls `onChange()` whenever something else is used. */
+/**
+ * Fills the list's place; calls `onChange()` whenever something else is used.
+ *
+ * @param {() => void} onChange
+ */
 export function thingList(onChange) {
   const things = new Map(); // {ref, name, scene, url, use, row} of all datasets looked at; `use`: "", "task", "practice"
   let here = []; // of the dataset that is shown

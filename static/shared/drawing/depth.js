@@ -5,7 +5,11 @@ import { rgb } from "../dom.js";
 const VERDICTS = ["no-data", "match", "in-front", "behind"];
 const loaded = new Map();
 
-/** The depth image of a frame, loaded once: what `meshDrawing` takes as `depth`. */
+/**
+ * The depth image of a frame, loaded once: what `meshDrawing` takes as `depth`.
+ *
+ * @param {Rest["FrameOut"]} frame
+ */
 export function depthOf(frame) {
   if (!loaded.has(frame)) {
     const loading = load(frame);

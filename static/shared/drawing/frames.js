@@ -8,7 +8,11 @@ import { resize } from "./webgl.js";
 const LINE_WIDTH = 0.7; // of the outline, as a share of that on the large image
 const DRAG_PAUSE = 200; // ms between thumbnails while all the time belongs to the large image
 
-/** Makes the strip; `choose(frame)` is called with the frame that is asked for. */
+/**
+ * Makes the strip; `choose(frame)` is called with the frame that is asked for.
+ *
+ * @param {(frame: Rest["FrameOut"]) => unknown} choose
+ */
 export function frameStrip(choose) {
   const stale = new Set();
   const visible = new Set();

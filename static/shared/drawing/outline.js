@@ -9,7 +9,11 @@ const BLOCK = 16; // pixels: sizes are multiples, so that the levels of a mipmap
 
 let shared = null;
 
-/** The page's object, {mesh, drawOn}: its mesh, and what `meshCopying` makes of it; one for all who show it. */
+/**
+ * The page's object, {mesh, drawOn}: its mesh, and what `meshCopying` makes of it; one for all who show it.
+ *
+ * @param {string} url
+ */
 export function sharedDrawing(url) {
   shared ??= loadMesh(url).then((mesh) => ({ mesh, drawOn: meshCopying(mesh) }));
   return shared;
@@ -26,14 +30,25 @@ async function loadMesh(url) {
   return { vertices, faces: new Uint32Array(content, 8 + vertices.byteLength, 3 * faceCount) };
 }
 
-/** The pinhole camera of a picture that is shown `scale` times as large, its corner at (left, top) of a canvas. */
+/**
+ * The pinhole camera of a picture that is shown `scale` times as large, its corner at (left, top) of a canvas.
+ *
+ * @param {Intrinsics} intrinsics
+ * @param {Shown} shown
+ */
 export function shownCamera({ fx, fy, cx, cy }, { scale, left, top }) {
   // (0, 0) is the centre of the first pixel, in the picture as on the canvas.
   const along = (centre, corner) => scale * (centre + 0.5) + corner - 0.5;
   return { fx: scale * fx, fy: scale * fy, cx: along(cx, left), cy: along(cy, top) };
 }
 
-/** The box {left, top, right, bottom} around a mesh in the picture [pixels from its corner]; null where behind. */
+/**
+ * The box {left, top, right, bottom} around a mesh in the picture [pixels from its corner]; null where behind.
+ *
+ * @param {Pick<Mesh, "vertices">} mesh
+ * @param {Matrix} T
+ * @param {Intrinsics} intrinsics
+ */
 export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
   const box = { left: Infinity, top: Infinity, right: -Infinity, bottom: -Infinity };
   for (let i = 0; i < vertices.length; i += 3) {
@@ -59,11 +74,19 @@ export function extentInPicture({ vertices }, T, { fx, fy, cx, cy }) {
  * blue] from 0 to 1, `blend` from 0 (the outline alone) to 1 (the shape hides what is below), the pixels of the
  * canvas in one of the page, up to 2, and the depth image of `loadDepth` with its `verdicts` (four colours: no data,
  * match, in front, behind), where the shape is to show how depth agrees with it.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {Mesh} mesh
  */
 export function meshDrawing(canvas, { vertices, faces }) {
   // What was drawn is kept, so that it can be copied and a page at rest draws nothing.
-  const gl = canvas.getContext("webgl2", { antialias: false, depth: false, preserveDrawingBuffer: true });
-  if (!gl) return null;
+  const context = canvas.getContext("webgl2", {
+    antialias: false,
+    depth: false,
+    preserveDrawingBuffer: true,
+  });
+  if (!context) return null;
+  const gl = context;
   let programs = setUp(gl, vertices, faces);
   let buffers = null;
   let depthThere = null;
@@ -102,7 +125,7 @@ export function meshDrawing(canvas, { vertices, faces }) {
     gl.drawElements(gl.TRIANGLES, faces.length, gl.UNSIGNED_INT, 0);
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, buffers.sampled);
     gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, buffers.resolved);
-    const all = [0, 0, buffers.width, buffers.height];
+    const all = /** @type {const} */ ([0, 0, buffers.width, buffers.height]);
     gl.blitFramebuffer(...all, ...all, gl.COLOR_BUFFER_BIT, gl.NEAREST);
     gl.generateMipmap(gl.TEXTURE_2D);
   }
@@ -133,6 +156,8 @@ export function meshDrawing(canvas, { vertices, faces }) {
 /**
  * What draws a mesh on many canvases, {camera, T, ...} each, by one hidden WebGL canvas, since a browser allows only a
  * few; or null. Copying waits for all that WebGL still has to do: not for what follows the mouse.
+ *
+ * @param {Mesh} mesh
  */
 export function meshCopying(mesh) {
   const hidden = document.createElement("canvas");

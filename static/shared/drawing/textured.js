@@ -9,6 +9,8 @@ let shared = null;
 /**
  * What `sharedDrawing` gives of the page's object, and `drawUnder(canvas, {camera, T})`, which draws it in its own
  * colours under what a canvas shows already: null where it has none, or the browser no WebGL 2.
+ *
+ * @param {Pick<Rest["ObjectDetail"], "outline_mesh_url" | "textured_mesh_url">} object
  */
 export async function objectDrawing({ outline_mesh_url: outline, textured_mesh_url: textured }) {
   shared ??= textured === null ? null : load(textured).then(drawingUnder);

@@ -3,7 +3,13 @@
 export const NEAR = 0.01; // metres
 const FAR = 100;
 
-/** From camera axes (x right, y down, z forward) to WebGL's clip space, row by row. */
+/**
+ * From camera axes (x right, y down, z forward) to WebGL's clip space, row by row.
+ *
+ * @param {Intrinsics} intrinsics
+ * @param {number} width
+ * @param {number} height
+ */
 export function projection({ fx, fy, cx, cy }, width, height) {
   const depth = FAR - NEAR;
   return [
@@ -14,19 +20,29 @@ export function projection({ fx, fy, cx, cy }, width, height) {
   ];
 }
 
-/** A 4x4 matrix as WebGL wants it. */
+/**
+ * A 4x4 matrix as WebGL wants it.
+ *
+ * @param {Matrix} matrix
+ */
 export function columns(matrix) {
   return new Float32Array([0, 1, 2, 3].flatMap((column) => matrix.map((row) => row[column])));
 }
 
-/** A program of these two shaders, and `at(name)`, where its uniforms are. */
+/**
+ * A program of these two shaders, and `at(name)`, where its uniforms are.
+ *
+ * @param {WebGL2RenderingContext} gl
+ * @param {string} vertex
+ * @param {string} fragment
+ */
 export function link(gl, vertex, fragment) {
   const program = gl.createProgram();
-  for (const [kind, source] of [
-    [gl.VERTEX_SHADER, vertex],
-    [gl.FRAGMENT_SHADER, fragment],
+  for (const { kind, source } of [
+    { kind: gl.VERTEX_SHADER, source: vertex },
+    { kind: gl.FRAGMENT_SHADER, source: fragment },
   ]) {
-    const shader = gl.createShader(kind);
+    const shader = /** @type {WebGLShader} */ (gl.createShader(kind));
     gl.shaderSource(shader, source);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
@@ -40,7 +56,13 @@ export function link(gl, vertex, fragment) {
   return { program, at };
 }
 
-/** Gives a canvas a size in pixels; only where it changes, since that wipes it. */
+/**
+ * Gives a canvas a size in pixels; only where it changes, since that wipes it.
+ *
+ * @param {HTMLCanvasElement} canvas
+ * @param {number} width
+ * @param {number} height
+ */
 export function resize(canvas, width, height) {
   if (canvas.width !== width) canvas.width = width;
   if (canvas.height !== height) canvas.height = height;

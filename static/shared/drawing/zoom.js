@@ -9,6 +9,9 @@ const LINE = 33; // wheel units to a line
 /**
  * Makes the picture in `box` zoomable. `onChange({scale, left, top})` is told how to show it: page pixels to
  * a pixel of the picture, and where in the box the picture's corner lies [page pixels].
+ *
+ * @param {HTMLElement} box
+ * @param {(view: Shown) => void} onChange
  */
 export function zoomable(box, onChange) {
   let size = { width: 1, height: 1 };

@@ -20,6 +20,7 @@ test("faces are hit from both sides", () => {
 
 test("what lies beside, behind or along a face is missed", () => {
   assert.equal(firstHit(MESH, [2, 0, 0], [0, 0, 1]), null);
+  assert.equal(firstHit(MESH, [0.9, 0.5, 0], [0, 0, 1]), null); // beyond the longest edge
   assert.equal(firstHit(MESH, [0, 0, 5], [0, 0, 1]), null);
   assert.equal(firstHit(MESH, [-5, 0, 1], [1, 0, 0]), null);
 });
