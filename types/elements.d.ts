@@ -13,6 +13,7 @@ interface ElementsById {
   "add-start": HTMLElementTagNameMap["button"];
   "add-tasks": HTMLElementTagNameMap["dialog"];
   "add-tasks-form": HTMLElementTagNameMap["form"];
+  "add-tasks-title": HTMLElementTagNameMap["h2"];
   "agreement": HTMLElementTagNameMap["p"];
   "agreement-label": HTMLElementTagNameMap["h2"];
   "agreement-residual": HTMLElementTagNameMap["span"];
@@ -71,6 +72,7 @@ interface ElementsById {
   "contents": HTMLElementTagNameMap["dl"];
   "copies": HTMLElementTagNameMap["dialog"];
   "copies-none": HTMLElementTagNameMap["p"];
+  "copies-title": HTMLElementTagNameMap["h2"];
   "copy": HTMLElementTagNameMap["button"];
   "copy-label": HTMLElementTagNameMap["span"];
   "copy-list": HTMLElementTagNameMap["ol"];
@@ -97,6 +99,7 @@ interface ElementsById {
   "earlier-title": HTMLElementTagNameMap["h2"];
   "editor": HTMLElementTagNameMap["form"];
   "editor-title": HTMLElementTagNameMap["h2"];
+  "ended-icon": SVGElementTagNameMap["use"];
   "ended-text": HTMLElementTagNameMap["strong"];
   "event-next": HTMLElementTagNameMap["button"];
   "event-previous": HTMLElementTagNameMap["button"];
@@ -157,6 +160,7 @@ interface ElementsById {
   "import-progress-area": HTMLElementTagNameMap["div"];
   "import-start": HTMLElementTagNameMap["button"];
   "import-status": HTMLElementTagNameMap["p"];
+  "import-title": HTMLElementTagNameMap["h2"];
   "instructions": HTMLElementTagNameMap["section"];
   "instructions-accurate": HTMLElementTagNameMap["textarea"];
   "instructions-quick": HTMLElementTagNameMap["textarea"];
@@ -172,6 +176,7 @@ interface ElementsById {
   "key-list": HTMLElementTagNameMap["div"];
   "key-search": HTMLElementTagNameMap["input"];
   "keys": HTMLElementTagNameMap["dialog"];
+  "keys-title": HTMLElementTagNameMap["h2"];
   "lanes": SVGElementTagNameMap["svg"];
   "leaving": HTMLElementTagNameMap["p"];
   "leaving-text": HTMLElementTagNameMap["span"];
@@ -255,6 +260,7 @@ interface ElementsById {
   "place-leave": HTMLElementTagNameMap["button"];
   "place-mode": HTMLElementTagNameMap["p"];
   "play": HTMLElementTagNameMap["button"];
+  "play-icon": SVGElementTagNameMap["use"];
   "play-text": HTMLElementTagNameMap["span"];
   "playhead": HTMLElementTagNameMap["span"];
   "plot": HTMLElementTagNameMap["div"];
@@ -300,6 +306,7 @@ interface ElementsById {
   "risk-set": HTMLElementTagNameMap["button"];
   "risk-source": HTMLElementTagNameMap["p"];
   "risk-threshold": HTMLElementTagNameMap["p"];
+  "risk-title": HTMLElementTagNameMap["h2"];
   "save": HTMLElementTagNameMap["button"];
   "saved": HTMLElementTagNameMap["span"];
   "saved-text": HTMLElementTagNameMap["span"];
@@ -324,6 +331,7 @@ interface ElementsById {
   "skip": HTMLElementTagNameMap["button"];
   "skip-dialog": HTMLElementTagNameMap["dialog"];
   "skip-idle": HTMLElementTagNameMap["input"];
+  "skip-title": HTMLElementTagNameMap["h2"];
   "snap": HTMLElementTagNameMap["button"];
   "snap-frames": HTMLElementTagNameMap["span"];
   "snap-seconds": HTMLElementTagNameMap["span"];
@@ -401,6 +409,7 @@ interface ElementsById {
   "warnings-form": HTMLElementTagNameMap["form"];
   "warnings-list": HTMLElementTagNameMap["ul"];
   "warnings-message": HTMLElementTagNameMap["div"];
+  "warnings-title": HTMLElementTagNameMap["h2"];
   "what-title": HTMLElementTagNameMap["h2"];
   "withdraw": HTMLElementTagNameMap["button"];
   "withdraw-dialog": HTMLElementTagNameMap["dialog"];

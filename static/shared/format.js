@@ -30,7 +30,7 @@ export function fileSize(bytes) {
 /**
  * "3 frames", "3 frames, 2 of 2 others agree"; empty where there is one frame and nothing to add.
  *
- * @param {Rest["FramesReportOut"] | null} frames
+ * @param {Rest["FramesReport"] | null} frames
  */
 export function framesText(frames) {
   if (!frames) return "";

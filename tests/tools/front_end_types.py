@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, cast
 
 from app.main import create_app
+from app.pages import TEMPLATES, html_of
 from app.services import Services
 from tests.conftest import REPOSITORY
 
 TYPES = REPOSITORY / "types"
-PAGES = sorted(path for folder in ("static", "app") for path in (REPOSITORY / folder).rglob("*.html"))
+PAGES = sorted(path.stem for path in TEMPLATES.glob("*.html"))
 NODE = Path(sys.executable).parent / "node"
 GENERATOR = REPOSITORY / "node_modules" / ".bin" / "openapi-typescript"
 SVG = {"svg", "g", "path", "use", "text", "line", "rect", "circle"}
@@ -65,14 +66,14 @@ class _Ids(HTMLParser):
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found += [(value, tag) for name, value in attrs if name == "id" and value and "{" not in value]
+        self.found += [(value, tag) for name, value in attrs if name == "id" and value]
 
 
 def main() -> None:
     """Write the files, or with --check compare them."""
     wanted = {
         TYPES / "rest.d.ts": rest_types(),
-        TYPES / "elements.d.ts": element_types(page.read_text() for page in PAGES),
+        TYPES / "elements.d.ts": element_types(map(html_of, PAGES)),
     }
     for path, content in wanted.items():
         if "--check" not in sys.argv:
