@@ -306,7 +306,7 @@ class SceneView:
 
 def _refuse_sharing(server: viser.ViserServer) -> None:
     # Any client may ask viser for a public tunnel to this server; hiding the button would not stop that.
-    websocket = server._websock_server
+    websocket = server._websock_server  # noqa: SLF001 - viser has no public way
     websocket.unregister_handler(_messages.ShareUrlRequest)
     websocket.unregister_handler(_messages.ShareUrlDisconnect)
 

@@ -119,13 +119,17 @@ class Snapper:
 
     def wait_until_ready(self) -> None:
         """Return when workers are there; raises what kept them from starting."""
-        self._client.result()
+        self.client()
+
+    def client(self) -> Client:
+        """Dask's client, when workers are there; raises what kept them from starting."""
+        return self._client.result()
 
     def worker_count(self) -> int:
         """How many workers are there now."""
         if not self._client.done() or self._client.exception() is not None:
             return 0
-        return len(self._client.result().scheduler_info(n_workers=-1)["workers"])
+        return len(self.client().scheduler_info(n_workers=-1)["workers"])
 
     def waiting_count(self) -> int:
         """How many snaps wait for a worker now; live ones, which nobody waits for, do not count."""
@@ -185,7 +189,7 @@ class Snapper:
         if self._client.done() and not self._client.cancelled() and self._client.exception() is None:
             with suppress(OSError):  # the scheduler may be gone already
                 self._stop(list(self._left))
-            self._client.result().close()
+            self.client().close()
         if self._cluster is not None:
             self._cluster.close()
 
@@ -223,7 +227,7 @@ class Snapper:
         if pending is None:
             return
         pending.preparing = False
-        future = self._client.result().submit(
+        future = self.client().submit(
             jobs.run_job, pending.job, content, pure=False, priority=pending.priority
         )
         pending.future = future
@@ -312,7 +316,7 @@ class Snapper:
             future.cancel()
 
     def _submit_build(self, model: ObjectModel, priority: int) -> Future:
-        return self._client.result().submit(jobs.build, model, pure=False, priority=priority)
+        return self.client().submit(jobs.build, model, pure=False, priority=priority)
 
     def _prepare(self, model: ObjectModel) -> None:
         if not self._lacking([model.content_hash]):
@@ -351,7 +355,7 @@ class Snapper:
         """
         within = PATIENCE if patience is None else patience
         try:
-            answers: dict[str, Any] = self._client.result().run(
+            answers: dict[str, Any] = self.client().run(
                 function, *args, workers=workers, on_error="ignore", callback_timeout=within
             )
         except TimeoutError:

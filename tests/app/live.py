@@ -8,12 +8,14 @@ from dataclasses import dataclass, field
 import httpx
 import uvicorn
 
+from app.access.auth import Identity
 from app.api.dependencies import SESSION_COOKIE
 from app.labeling.live.live_session import LiveSession
 from app.main import create_app
 from app.services import Services
 from app.serving.connections import server_config
-from app.storage.roles import Role
+from app.storage.roles import Actor, Role
+from app.storage.tables import Registration
 from tests.app.waiting import LONGEST, wait_until
 
 
@@ -59,7 +61,10 @@ class LiveServer:
 
     def live_session(self, registration_id: int) -> LiveSession:
         """The live session of a registration."""
-        return self.services.live_sessions._sessions[registration_id]
+        with self.services.database.read() as session:
+            owner = session.get_one(Registration, registration_id).user_id
+        identity = Identity(owner, "", Role.OPERATOR, Actor.HUMAN)
+        return self.services.live_sessions.open(registration_id, identity)
 
 
 @contextmanager

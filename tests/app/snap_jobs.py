@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from app.storage.files import PreparedStore
+from app.workers import jobs
 from app.workers.jobs import JobView, SnapJob
 from app.workers.pool import SnapError, Snapper
 from registration_core import Estimate, Intrinsics, ObjectModel, SnapConfig, snap
@@ -109,15 +110,9 @@ def result_of(outcome: Outcome) -> Estimate | SnapError:
 
 def pids(snapper: Snapper) -> set[int]:
     """Of the worker processes."""
-    return set(snapper._client.result().run(os.getpid).values())
+    return set(snapper.client().run(os.getpid).values())
 
 
 def knowing(snapper: Snapper, digest: str) -> int:
     """How many workers know an object."""
-
-    def knows() -> bool:
-        from app.workers import jobs
-
-        return digest in jobs._objects
-
-    return sum(snapper._client.result().run(knows).values())
+    return sum(not lacking for lacking in snapper.client().run(jobs.lacking, [digest]).values())

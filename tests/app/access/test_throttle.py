@@ -1,6 +1,8 @@
 """Guessing is slow by name and address, and by address alone; nobody else is slowed down."""
 
+import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -79,13 +81,16 @@ def test_a_network_of_ipv6_is_one_caller(throttle, one, other, are_one):
     assert (throttle.attempt("ann", other) > 0) is are_one
 
 
-def test_what_was_long_ago_is_forgotten_and_cleared_away(throttle, clock):
+def test_what_was_long_ago_is_forgotten_and_cleared_away(clock, tmp_path: Path):
+    throttle = Throttle(tmp_path / "throttle.sqlite")
     for i in range(FREE_ATTEMPTS):
         throttle.attempt("ann", HERE)
         throttle.attempt(f"name {i}", f"198.51.100.{i}")
     clock.seconds += SECONDS_UNTIL_FORGOTTEN + 1
     assert throttle.attempt("ann", HERE) == 0.0
-    assert throttle._opened.execute("SELECT count(*) FROM attempts").fetchone() == (2,)
+    throttle.close()
+    with closing(sqlite3.connect(tmp_path / "throttle.sqlite")) as counts:
+        assert counts.execute("SELECT count(*) FROM attempts").fetchone() == (2,)
 
 
 def test_no_name_is_kept_as_it_was_typed(clock, tmp_path: Path):

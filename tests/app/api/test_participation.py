@@ -134,7 +134,7 @@ def test_withdrawing_ends_it_at_once(server, chief, study):
     registration = begin_next(client)
     assert client.post("/api/participation/withdraw").status_code == 204
     sentence(client.get("/api/participation"), 401)
-    assert registration["id"] not in server.services.live_sessions._sessions
+    assert server.services.live_sessions.live_state(registration["id"]) is None
     (row,) = chief.get(f"/api/studies/{study['id']}").json()["participants"]
     assert row["withdrawn_at"]
 

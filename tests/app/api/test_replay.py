@@ -115,10 +115,11 @@ def test_a_registration_under_way_is_brought_up_to_now(live):
 def test_an_idle_replay_is_closed_and_opens_again(live, una):
     replays = live.services.replays
     una.http.post(f"{url_of(una.id)}/replay")
-    path = replays.get(una.id, una.http.get("/api/me").json()["id"]).view.socket_path
+    user_id = una.http.get("/api/me").json()["id"]
+    replay = replays.get(una.id, user_id)
     with una.view(f"replay/{una.id}"):
-        wait_until(lambda: any(r.watchers for r in replays._replays.values()), "the watcher")
+        wait_until(lambda: replay.watchers, "the watcher")
         replays.close_idle(0.0)
-        assert path in {replay.view.socket_path for replay in replays._replays.values()}
+        assert replays.get(una.id, user_id) is replay
     wait_until(lambda: replays.close_idle(0.0), "the replay to be closed")
     assert una.http.put(f"{url_of(una.id)}/replay", json={"seconds": 0}).status_code == 200

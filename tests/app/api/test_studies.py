@@ -113,7 +113,7 @@ def test_closing_ends_it_for_everybody(server, chief):
     client = take_part(server, link)
     registration = begin_next(client)
     assert chief.post(f"/api/studies/{study['id']}/close").json()["state"] == "closed"
-    assert registration["id"] not in server.services.live_sessions._sessions
+    assert server.services.live_sessions.live_state(registration["id"]) is None
     sentence(client.get("/api/participation"), 401)
     again = server.stranger().post("/api/sign-in/study", json={"token": link.partition("#")[2]})
     assert "this link is not valid" in sentence(again, 401)

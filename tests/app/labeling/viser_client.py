@@ -63,6 +63,11 @@ class ViserClient:
     ) -> None:
         self.close()
 
+    @property
+    def subprotocol(self) -> str | None:
+        """What was agreed on."""
+        return self._socket.subprotocol
+
     def close(self) -> None:
         """End the connection."""
         self._socket.close()

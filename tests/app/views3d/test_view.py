@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import pytest
 import trimesh
+import viser
 from scipy.spatial.transform import Rotation
 
 from app.datasets.outline_mesh import MOST_FACES, drawable
@@ -386,7 +387,9 @@ def test_a_locked_object_has_no_handles_left(view):
             assert update["updates"][name] is True
 
 
-def test_a_request_for_a_public_tunnel_is_refused(view, hand, model):
+def test_a_request_for_a_public_tunnel_is_refused(view, hand, model, monkeypatch):
+    asked: list[viser.ViserServer] = []
+    monkeypatch.setattr(viser.ViserServer, "request_share_url", lambda server: asked.append(server))  # noqa: PLW0108 - a function binds
     with connect(view) as client:
         client.send("ShareUrlRequest")
         client.send("ShareUrlDisconnect")
@@ -395,7 +398,7 @@ def test_a_request_for_a_public_tunnel_is_refused(view, hand, model):
         view.show_cloud(POINTS, COLORS, point_size=0.002)
         client.node("PointCloudMessage", "/cloud")  # whatever was answered came before this
         assert not [m for m in client.messages if m["type"] == "ShareUrlUpdated"]
-    assert view._server._share_tunnel is None
+    assert not asked
 
 
 def test_a_closed_view_serves_nobody(hand, model):

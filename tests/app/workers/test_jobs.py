@@ -150,14 +150,13 @@ def test_a_bad_job_is_refused_by_name(client, addresses, model, content):
 
 
 def test_only_the_recent_objects_are_kept(monkeypatch, content):
-    monkeypatch.setattr(jobs, "_objects", type(jobs._objects)())
     monkeypatch.setattr(jobs, "KEPT_OBJECTS", 2)
     models = [new_model() for _ in range(3)]
     for one in models[:2]:
         jobs.keep(one.content_hash, content)
     assert jobs.run_job(new_job(models[0]), None) is not None  # and so is used the latest
     jobs.keep(models[2].content_hash, content)
-    assert list(jobs._objects) == [models[0].content_hash, models[2].content_hash]
+    assert jobs.lacking([model.content_hash for model in models]) == {models[1].content_hash}
     assert jobs.run_job(new_job(models[1]), None) is None
 
 

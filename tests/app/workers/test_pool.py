@@ -4,14 +4,13 @@ import os
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from functools import partial
+from typing import Any
 
 import numpy as np
 import psutil
 import pytest
 from distributed import Nanny, Scheduler, Worker
 
-from app.workers.jobs import SnapJob
 from app.workers.pool import DIED, SnapError, Snapper
 from registration_core import Estimate, ObjectModel, SnapConfig, region_of_interest
 from tests.app.export.site import CAMERA
@@ -58,19 +57,25 @@ def model(snapper: Snapper) -> ObjectModel:
 
 
 @pytest.fixture(autouse=True)
-def idle_workers(snapper: Snapper) -> Iterator[None]:
+def idle_workers(snapper: Snapper, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Each test finds the workers idle and leaves them so."""
     wait_until(lambda: busy(snapper) == 0, "the workers to be idle")
+    cancels: list[Callable[[], None]] = []
+    real = snapper.request
+
+    def requested(*args: Any, **named: Any) -> Callable[[], None]:
+        cancels.append(real(*args, **named))
+        return cancels[-1]
+
+    monkeypatch.setattr(snapper, "request", requested)
     yield
-    with snapper._lock:
-        left = list(snapper._pending)
-    for snap_id in left:
-        snapper._cancel(snap_id)
+    for cancel in cancels:
+        cancel()
 
 
 def executing(snapper: Snapper) -> dict[str, int]:
     """How many tasks each worker is at."""
-    return snapper._client.result().run(lambda dask_worker: len(dask_worker.state.executing))
+    return snapper.client().run(lambda dask_worker: len(dask_worker.state.executing))
 
 
 def busy(snapper: Snapper) -> int:
@@ -80,7 +85,7 @@ def busy(snapper: Snapper) -> int:
 
 def addresses(snapper: Snapper) -> list[str]:
     """Of the workers that are there now."""
-    return list(snapper._client.result().scheduler_info(n_workers=-1)["workers"])
+    return list(snapper.client().scheduler_info(n_workers=-1)["workers"])
 
 
 def forbid_building(snapper: Snapper) -> None:
@@ -91,7 +96,7 @@ def forbid_building(snapper: Snapper) -> None:
 
         jobs.build_viewpoint_model = None  # type: ignore[attr-defined,assignment]
 
-    snapper._client.result().run(forbid)
+    snapper.client().run(forbid)
 
 
 def test_it_finds_what_the_library_finds_on_the_whole_image(snapper, model):
@@ -149,11 +154,6 @@ def test_of_those_that_wait_for_a_worker_the_urgent_goes_first(tmp_path, model):
         check_that_the_urgent_goes_first(alone, model)
 
 
-def handed_over(snapper: Snapper, job: SnapJob) -> bool:
-    """Whether Dask has a snap."""
-    return snapper._pending[job.snap_id].future is not None
-
-
 def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> None:
     running, cancel = request(snapper, new_job(model, snapper.topic, SLOW), model)
     assert running.moved.wait(LONGEST)
@@ -169,17 +169,18 @@ def check_that_the_urgent_goes_first(snapper: Snapper, model: ObjectModel) -> No
         return on_end
 
     for name, priority in (("live", -1), ("asked for", 0)):
-        job = new_job(model)
-        snapper.request(job, model, told.on_progress, note(name), priority)
-        wait_until(partial(handed_over, snapper, job), "the snap to be handed over")
+        before = set(snapper.client().futures)
+        snapper.request(new_job(model), model, told.on_progress, note(name), priority)
+        wait_until(lambda: set(snapper.client().futures) - before, "the snap to be handed over")  # noqa: B023 - called here
     cancel()
     assert isinstance(result_of(told), Estimate)
     assert order == ["asked for", "live"] and told.shares == []
 
 
 def test_it_is_known_how_a_snap_stands(snapper, model):
-    running = [request(snapper, new_job(model, snapper.topic, SLOW), model) for _ in range(2)]
-    assert all(outcome.moved.wait(LONGEST) for outcome, _ in running)
+    running = [new_job(model, snapper.topic, SLOW) for _ in range(2)]
+    outcomes = [request(snapper, job, model)[0] for job in running]
+    assert all(outcome.moved.wait(LONGEST) for outcome in outcomes)
     waiting = [new_job(model, snapper.topic) for _ in range(2)]
     cancels = [request(snapper, job, model)[1] for job in waiting]
     live = new_job(model)
@@ -192,8 +193,7 @@ def test_it_is_known_how_a_snap_stands(snapper, model):
     cancels[0]()
     assert snapper.standing(waiting[1].snap_id).ahead == 0
     assert snapper.standing(waiting[0].snap_id) is None
-    ids = list(snapper._pending)
-    assert all(snapper.standing(snap_id).ahead == 0 for snap_id in ids[:2])
+    assert all(snapper.standing(job.snap_id).ahead == 0 for job in running)
 
 
 def test_a_snap_that_waits_for_its_object_says_so(snapper, model):
@@ -203,7 +203,8 @@ def test_a_snap_that_waits_for_its_object_says_so(snapper, model):
     built = snapper.built(unknown)  # which waits for a worker
     outcome, _ = request(snapper, job := new_job(unknown, snapper.topic), unknown)
     assert not snapper.standing(job.snap_id).preparing
-    snapper._call(job.snap_id, snapper._submit_with_object, job.snap_id)  # as if it came back from a worker
+    # as if it came back from a worker, of which none is free to let it come back
+    snapper._call(job.snap_id, snapper._submit_with_object, job.snap_id)  # noqa: SLF001
     wait_until(lambda: snapper.standing(job.snap_id).preparing, "the snap to wait for its object")
     assert snapper.built(unknown) is built
     for _, cancel in held:
@@ -219,7 +220,7 @@ def test_workers_outlast_a_sleep_of_the_machine(snapper):
             await watch.callback()
 
     before = pids(snapper)
-    snapper._client.result().run_on_scheduler(wake_up)
+    snapper.client().run_on_scheduler(wake_up)
     assert pids(snapper) == before and len(before) == 2
 
 
@@ -257,7 +258,7 @@ def test_a_worker_that_dies_in_mid_snap_fails_that_snap_only(snapper, model):
     assert snapper.worker_count() == 2
     doomed, _ = request(snapper, new_job(model, snapper.topic, SnapConfig.paper()), model)
     assert doomed.moved.wait(LONGEST)
-    client = snapper._client.result()
+    client = snapper.client()
     (address,) = [worker for worker, count in executing(snapper).items() if count]
     os.kill(client.run(os.getpid, workers=[address])[address], signal.SIGKILL)
     end = result_of(doomed)
@@ -290,7 +291,7 @@ def test_idle_processes_rest(snapper):
         """Milliseconds between the calls of whatever recurs."""
         return {name: call.callback_time for name, call in dask_worker.periodic_callbacks.items()}
 
-    client = snapper._client.result()
+    client = snapper.client()
     workers, nannies = client.run(pauses), client.run(pauses, nanny=True)
     recurring = [*workers.values(), *nannies.values()]
     assert len(recurring) == 4

@@ -2,16 +2,16 @@
 
 import os
 import signal
-from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import closing
 from threading import Event, Thread, current_thread
 
 import dask
 import pytest
-from distributed import Client, Worker
+from distributed import Client, Future, Worker
 
 from app.workers.pool import UNREACHABLE, SnapError, Snapper
+from app.workers.prepared import PreparedObjects
 from registration_core import Estimate, ObjectModel, SnapConfig
 from tests.app.rest import SLOW_SNAP
 from tests.app.snap_jobs import knowing, new_job, new_model, pids, request, result_of, store_in
@@ -56,17 +56,17 @@ def test_workers_of_a_cluster_do_not_go_on_for_who_has_closed(cluster, model, tm
     wait_until_idle(cluster)
 
 
-def test_who_asks_while_the_server_closes_leaves_no_worker_at_it(cluster, model, tmp_path):
+def test_who_asks_while_the_server_closes_leaves_no_worker_at_it(cluster, model, tmp_path, monkeypatch):
     elsewhere = Snapper(cluster, 1, store_in(tmp_path))
-    close_objects, asked = elsewhere._objects.close, []
+    close_objects, asked = PreparedObjects.close, []
 
-    def late() -> None:
+    def late(objects: PreparedObjects) -> None:
         outcome, cancel = request(elsewhere, new_job(model, elsewhere.topic, SLOW), model)
         assert outcome.moved.wait(LONGEST)
         asked.append(cancel)
-        close_objects()
+        close_objects(objects)
 
-    elsewhere._objects.close = late  # type: ignore[method-assign]
+    monkeypatch.setattr(PreparedObjects, "close", late)
     elsewhere.close()
     asked[0]()  # too late to matter
     wait_until_idle(cluster)
@@ -91,22 +91,17 @@ def test_a_worker_that_is_stuck_does_not_hold_the_closing_up(cluster, model, tmp
     wait_until_idle(cluster)
 
 
-def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path):
+def test_only_own_threads_wait_for_what_the_scheduler_brings(cluster, tmp_path, monkeypatch):
     """Dask's one is every client's, and who waits there while his own closes may wait for ever."""
     waited_in: list[str] = []
+    result = Future.result
 
-    def noted(function: Callable[..., None]) -> Callable[..., None]:
-        def note(*args: object) -> None:
-            waited_in.append(current_thread().name.rstrip("_0123456789"))
-            function(*args)
+    def noted(future: Future, *args: object) -> object:
+        waited_in.append(current_thread().name.rstrip("_0123456789"))
+        return result(future, *args)
 
-        return note
-
+    monkeypatch.setattr(Future, "result", noted)
     with closing(Snapper(cluster, 1, store_in(tmp_path))) as elsewhere:
-        elsewhere._on_done = noted(elsewhere._on_done)  # type: ignore[method-assign]
-        elsewhere._objects._on_built = noted(  # type: ignore[method-assign]
-            elsewhere._objects._on_built
-        )
         model = new_model()
         outcome, _ = request(elsewhere, new_job(model, elsewhere.topic), model)
         assert isinstance(result_of(outcome), Estimate)

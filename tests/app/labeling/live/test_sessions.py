@@ -11,10 +11,9 @@ from sqlalchemy import select
 from app.datasets.symmetries import decide
 from app.labeling.live.sessions import NotFoundError
 from app.labeling.session_state import SessionState
-from app.recent import Recent
 from app.storage.roles import Actor, Role
 from app.storage.tables import Object, Participant, Registration, Study, Task, User, utc_now
-from registration_core import SnapConfig, SymmetryAxis
+from registration_core import ObjectModel, SnapConfig, SymmetryAxis
 from registration_core.geometry import pose
 from tests.app.labeling.live_sessions import shown, sign_up
 from tests.app.labeling.viser_client import ViserClient
@@ -51,16 +50,16 @@ def test_each_user_has_a_registration_of_their_own(services, live_session, ann):
         services.live_sessions.open(live_session.registration.id, bob)
 
 
-def test_nobody_waits_while_the_mesh_of_another_is_read(services, live_session, ann):
+def test_nobody_waits_while_the_mesh_of_another_is_read(services, live_session, ann, monkeypatch):
     asked, may_come = threading.Event(), threading.Event()
-    read = services.data._load_model
+    read = ObjectModel.from_bytes
 
     def slow(*arguments):
         asked.set()
         assert may_come.wait(LONGEST)
         return read(*arguments)
 
-    services.data._model = Recent(1, slow)
+    monkeypatch.setattr(ObjectModel, "from_bytes", slow)
     with services.database.read() as session:
         mine = live_session.registration.task.object_id
         task_id = session.scalars(select(Task.id).where(Task.object_id != mine)).first()
@@ -179,15 +178,16 @@ def test_sessions_close_also_where_that_cannot_be_written_down(services, live_se
         raise OSError(errno.ENOSPC, "No space left on device")
 
     other = services.live_sessions.start(2, sign_up(services, "bob"))
-    for one in (live_session, other):
-        one.session.snap(Actor.HUMAN, SnapConfig.from_dict(SLOW_SNAP))
+    snap_ids = [
+        one.session.snap(Actor.HUMAN, SnapConfig.from_dict(SLOW_SNAP)) for one in (live_session, other)
+    ]
     with monkeypatch.context() as full:
         full.setattr(services.log, "append", refuse)
         assert services.live_sessions.close_idle(0.0) == 2
     again = services.live_sessions.open(live_session.registration.id, ann)
     assert again is not live_session
     again.session.set_pose(true_pose(TOOL), Actor.HUMAN)
-    wait_until(lambda: not services.snapper._pending, "the workers to be given up")
+    wait_until(lambda: not any(map(services.snapper.standing, snap_ids)), "the workers to be given up")
     kinds = [event.kind for event in services.log.events(live_session.registration.id)]
     assert kinds == ["opened", "snap_requested", "set_pose"]
 

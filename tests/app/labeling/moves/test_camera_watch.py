@@ -65,9 +65,10 @@ def test_what_could_not_be_written_down_is_logged_and_the_next_is_told(listener,
 
 
 def test_a_closed_watch_tells_nothing(listener):
+    before = set(threading.enumerate())
     watch = CameraWatch(listener)
     watch.moved({"fov": 1.0})
     watch.close()
     watch.moved({"fov": 2.0})
-    assert watch._timer is not None and not watch._timer.is_alive()
+    assert set(threading.enumerate()) <= before
     assert listener.told == []
