@@ -22,10 +22,12 @@ HERE, ELSEWHERE = "192.0.2.1", "198.51.100.7"
 
 
 @pytest.fixture
-def auth(database: Database) -> Iterator[Auth]:
+def auth(database: Database, monkeypatch: pytest.MonkeyPatch) -> Iterator[Auth]:
     """Hashes passwords as any, but at the least cost."""
-    opened = Auth(database)
-    opened._passwords = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
+    cheap = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
+    with monkeypatch.context() as patched:
+        patched.setattr(PasswordHash, "recommended", lambda: cheap)
+        opened = Auth(database)
     yield opened
     opened.close()
 
