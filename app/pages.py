@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from fastapi import APIRouter, FastAPI, HTTPException, Request
-from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.base import RequestResponseEndpoint
 
@@ -67,9 +67,9 @@ def sign_in_page() -> HTMLResponse:
 
 
 @router.get("/api/docs")
-def rest_page() -> FileResponse:
+def rest_page() -> HTMLResponse:
     """REST, to read and to try out; like the description that it shows, it is open to all."""
-    return FileResponse(STATIC / "rest.html")
+    return HTMLResponse(html_of("rest"))
 
 
 @router.get("/")
