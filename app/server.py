@@ -39,7 +39,7 @@ def run(
         settings: What to serve with.
         listener: Where to serve.
         snapper: The workers, which may still be starting.
-        prepare: Update the database before; one that is new is made in any case, with the demo scenes.
+        prepare: Make or update the database before; a new one gets the demo scenes.
         say: Tells the person at the console.
 
     Raises:
@@ -48,7 +48,7 @@ def run(
     """
     keep_large_blocks_apart()
     rich.reconfigure(quiet=True)  # or viser announces the private address of every view
-    if prepare or _is_new(settings):
+    if prepare:
         prepare_state(settings, say)
     services = create_services(settings, snapper)
     config = server_config(
@@ -81,14 +81,6 @@ def prepare_state(settings: Settings, say: Callable[[str], None]) -> None:
         if is_empty and DEMO_SCENES.is_dir():
             summary = import_dataset(database, FileStore(settings.files_dir), DEMO_SCENES)
             say(f"Imported the demo scenes: {summary.tasks} tasks.")
-    finally:
-        database.close()
-
-
-def _is_new(settings: Settings) -> bool:
-    database = Database(settings.resolved_database_url)
-    try:
-        return database.is_new()
     finally:
         database.close()
 

@@ -27,7 +27,7 @@ import os, sys
 def watch(event, arguments):
     if event in ("open", "os.listdir", "os.scandir") and isinstance(arguments[0], (str, os.PathLike)):
         path = os.path.realpath(arguments[0])
-        if path.startswith({checkout!r} + os.sep) and not path.startswith({packages!r} + os.sep):
+        if path.startswith({checkout!r} + os.sep) and not (path + os.sep).startswith({packages!r} + os.sep):
             os.write(os.open({seen!r}, os.O_APPEND | os.O_CREAT | os.O_WRONLY), (path + "\\n").encode())
 
 sys.addaudithook(watch)

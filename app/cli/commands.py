@@ -1,6 +1,7 @@
 """The command line. Heavy imports stay inside the commands: worker processes import this module too."""
 
 import os
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,8 +62,10 @@ def serve(
     settings = read_settings(**given)
     listener = listen(settings)
     with held(settings.state_dir, settings.host, listener.getsockname()[1]):
-        if not prepare:
-            checked_database(settings).close()  # or it would be said when all else has started
+        with closing(open_database(settings)) as database:
+            prepare = prepare or database.is_new()
+            if not prepare:
+                database.check_version()  # or it would be said when all else has started
         from app.workers.pool import create_snapper
 
         snapper = create_snapper(settings)
